@@ -37,16 +37,14 @@ pub struct ReceiptSettings {
     motion_to: Option<MotionTo>,
     size: [u32; 2],
     antialiasing: u32,
-    aa_mode: AaMode,
     camera: String,
     /// `None` for transparent.
     background: Option<ColorDesc>,
     shadow_terminator: ShadowTerminator,
     /// Runs of lights in scene order with the same number of samples.
     light_samples: Vec<(usize, SamplesDesc)>,
-    crop: Option<Window>,
-    reference: bool,
-    visibility: VisibilityMode,
+    /// But for the buffers.
+    settings: RenderSettings,
 }
 
 /// What is wrong with a receipt.
@@ -175,14 +173,17 @@ impl ReceiptSettings {
             motion_to: from.optional("motion_to", motion_to)?,
             size: [from.required("width", number)?, from.required("height", number)?],
             antialiasing: from.required("antialiasing", number)?,
-            aa_mode: from.required("aa_mode", AaMode::from_name)?,
             camera: from.required("camera", text)?,
             background: from.required("background", background)?,
             shadow_terminator: from.required("shadow_terminator", ShadowTerminator::from_name)?,
             light_samples: from.required("light_samples", light_samples)?,
-            crop: from.optional("crop", crop)?,
-            reference,
-            visibility,
+            settings: RenderSettings {
+                aa_mode: from.required("aa_mode", AaMode::from_name)?,
+                crop: from.optional("crop", crop)?,
+                reference,
+                visibility,
+                ..RenderSettings::default()
+            },
         })
     }
 
@@ -220,14 +221,7 @@ impl ReceiptSettings {
 
     /// The settings that give the same film of the compiled scene.
     pub fn settings(&self, scene: &Scene) -> RenderSettings {
-        RenderSettings {
-            aa_mode: self.aa_mode,
-            crop: self.crop,
-            reference: self.reference,
-            visibility: self.visibility,
-            buffers: scene.buffers().to_vec(),
-            ..RenderSettings::default()
-        }
+        RenderSettings { buffers: scene.buffers().to_vec(), ..self.settings.clone() }
     }
 }
 
@@ -255,8 +249,11 @@ mod tests {
     #[test]
     fn every_entry_is_read_or_named() {
         let read = ReceiptSettings::read(&receipt(&LEAST)).unwrap();
-        assert_eq!((read.size, read.antialiasing, read.aa_mode), ([40, 30], 2, AaMode::Full));
-        assert_eq!((read.background, read.crop, read.tolerance), (Some(ColorDesc::linear(0.0, 0.25, 1.0)), None, None));
+        assert_eq!((read.size, read.antialiasing, read.settings.aa_mode), ([40, 30], 2, AaMode::Full));
+        assert_eq!(
+            (read.background, read.settings.crop, read.tolerance),
+            (Some(ColorDesc::linear(0.0, 0.25, 1.0)), None, None)
+        );
         let samples = [SamplesDesc::Exact, SamplesDesc::Count(16), SamplesDesc::Count(1)];
         assert_eq!(read.light_samples, samples.map(|samples| (1, samples)));
         assert_eq!(read.buffers, [Plane::Color.into()]);

@@ -221,8 +221,7 @@ impl LightScale {
 
     /// As renderers multiply with it.
     pub(crate) fn rgb(&self) -> Rgb {
-        let [r, g, b] = self.exact().map(|c| c as f32);
-        Rgb::new(r, g, b)
+        Rgb::from_array(self.exact().map(|c| c as f32))
     }
 
     /// What a camera sees of the light.

@@ -112,7 +112,7 @@ impl LightTree {
             let (left, right) = lights.split_at_mut(half);
             let children = [self.build(left), self.build(right)];
             let [left, right] = children.map(|child| &self.nodes[child as usize]);
-            let power = |node: &LightNode| channels(node.power).map(f64::from).iter().sum::<f64>();
+            let power = |node: &LightNode| node.power.to_array().map(f64::from).iter().sum::<f64>();
             let (share, all) = (power(left), power(left) + power(right));
             let is_left = uniform(self.nodes.len() as u64) * all < share;
             let representative = if is_left { left.representative } else { right.representative };
@@ -183,20 +183,14 @@ fn products(v: DVec3) -> [f64; 6] {
     [v.x * v.x, v.y * v.y, v.z * v.z, v.x * v.y, v.y * v.z, v.z * v.x]
 }
 
-/// The channels of a colour.
-fn channels(color: Rgb) -> [f32; 3] {
-    [color.r, color.g, color.b]
-}
-
 impl LightNode {
     fn new(bounds: LightBounds, contents: NodeContents, representative: u32, lights: &[TreeLight]) -> LightNode {
-        let rgb = |v: [f32; 3]| Rgb::new(v[0], v[1], v[2]);
         let (mut centroid, mut mean_normal) = ([lights[0].center; 3], [lights[0].bounds.axes.axis; 3]);
         let [mut power, mut second, mut third, mut normal] = [[0.0f32; 3]; 4];
         let mut covariance = [[0.0f32; 6]; 3];
         for channel in 0..3 {
             // In f64: a hundred thousand lights far from the origin
-            let power_of = |light: &TreeLight| f64::from(channels(light.power)[channel]);
+            let power_of = |light: &TreeLight| f64::from(light.power.to_array()[channel]);
             let mut sum = 0.0f64;
             let (mut at, mut n) = (DVec3::ZERO, DVec3::ZERO);
             for light in lights {
@@ -238,14 +232,14 @@ impl LightNode {
             bounds,
             contents,
             count: lights.len() as u32,
-            power: rgb(power),
+            power: Rgb::from_array(power),
             centroid,
             mean_normal,
             is_gray: power[0] > 0.0 && (1..3).all(|i| power[i] == 0.0 || is_same(i)),
             covariance,
-            second_moment: rgb(second),
-            third_moment: rgb(third),
-            normal_moment: rgb(normal),
+            second_moment: Rgb::from_array(second),
+            third_moment: Rgb::from_array(third),
+            normal_moment: Rgb::from_array(normal),
             shadows: lights.iter().all(|light| light.shadows),
             representative,
         }

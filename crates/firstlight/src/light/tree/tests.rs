@@ -96,7 +96,7 @@ fn truth(light: &Light, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> [[f64; 3]; 
         _ => 1.0,
     };
     let own = sums.map(|sum| sum * measure / f64::from(count));
-    own.map(|sum| channels(light.intensity).map(|c| f64::from(c) * sum))
+    own.map(|sum| light.intensity.to_array().map(|c| f64::from(c) * sum))
 }
 
 #[test]
@@ -152,7 +152,7 @@ fn no_bound_is_broken() {
                         *sum += one;
                     }
                 }
-                let flat = |sent: Colors| sent.0.map(|color| channels(color).map(f64::from));
+                let flat = |sent: Colors| sent.0.map(|color| color.to_array().map(f64::from));
                 let most = flat(node.max_contribution(&bounds));
                 for (sum, most) in sum.iter().flatten().zip(most.iter().flatten()) {
                     assert!(*sum <= most * 1.001 + 1e-12, "{round}: {sum} is more than {most}, {node:?}");
