@@ -12,6 +12,7 @@ use super::{CenterValue, FilmTile};
 use crate::camera::Frame;
 use crate::color::Rgb;
 use crate::image::{Buffer, Plane};
+use crate::light::Light;
 use crate::math::{DVec3, Ray, Vec3};
 use crate::scene::{Hit, ObjectSpace, Scene};
 use crate::shape::{RayDifferential, ShadowTerminator, SurfaceInteraction};
@@ -22,6 +23,8 @@ pub(super) struct Center<'a> {
     ray: Ray,
     differential: RayDifferential,
     pub hit: Hit,
+    /// The light that it is on, if any.
+    light: Option<&'a Light>,
     /// The surface, computed at its first use; `None` on a light.
     surface: OnceCell<Option<SurfaceInteraction>>,
 }
@@ -91,14 +94,14 @@ pub(super) fn nothing(plane: Plane) -> CenterValue {
 
 impl<'a> Center<'a> {
     pub fn new(scene: &'a Scene, ray: Ray, differential: RayDifferential, hit: Hit) -> Self {
-        Center { scene, ray, differential, hit, surface: OnceCell::new() }
+        let light = hit.surface.index().checked_sub(scene.geometry.surfaces.len()).map(|light| &scene.lights[light]);
+        Center { scene, ray, differential, hit, light, surface: OnceCell::new() }
     }
 
     /// The surface; `None` on a light. It is not lit, so it is not lifted off its facet.
     fn surface(&self) -> Option<&SurfaceInteraction> {
-        let Center { scene, ray, differential, hit, .. } = self;
-        let is_light = hit.surface.index() >= scene.geometry.surfaces.len();
-        let find = || (!is_light).then(|| scene.surface_with(ray, hit, differential, ShadowTerminator::Hard));
+        let Center { scene, ray, differential, hit, light, .. } = self;
+        let find = || light.is_none().then(|| scene.surface_with(ray, hit, differential, ShadowTerminator::Hard));
         self.surface.get_or_init(find).as_ref()
     }
 
@@ -123,10 +126,9 @@ impl<'a> Center<'a> {
 
     /// The unit normal of the front: of a shape, or of a light.
     pub fn front(&self) -> Vec3 {
-        let Scene { geometry, lights, .. } = self.scene;
-        match self.hit.surface.index().checked_sub(geometry.surfaces.len()) {
-            None => geometry.normals(&self.ray, &self.hit)[0],
-            Some(light) => lights[light].area().map_or(Vec3::ZERO, |area| area.shape.normal_at(self.p())),
+        match self.light {
+            None => self.scene.geometry.normals(&self.ray, &self.hit)[0],
+            Some(light) => light.area().map_or(Vec3::ZERO, |area| area.shape.normal_at(self.p())),
         }
     }
 
@@ -137,10 +139,11 @@ impl<'a> Center<'a> {
 
     /// The geometric and the shading normal, towards the viewer.
     pub fn normals(&self) -> [Vec3; 2] {
-        let Scene { geometry, .. } = self.scene;
-        let is_light = self.hit.surface.index() >= geometry.surfaces.len();
         // Without what else there is to know of the surface
-        let [normal, shading] = if is_light { [self.front(); 2] } else { geometry.normals(&self.ray, &self.hit) };
+        let [normal, shading] = match self.light {
+            None => self.scene.geometry.normals(&self.ray, &self.hit),
+            Some(_) => [self.front(); 2],
+        };
         if normal.dot(-self.ray.d) < 0.0 { [-normal, -shading] } else { [normal, shading] }
     }
 

@@ -129,14 +129,7 @@ impl PixelHits {
             let (columns, rows) = (&xs[part % 2 * 4..][..4], &ys[part / 2 * 4..][..4]);
             let x: [f32; LANES] = std::array::from_fn(|k| columns[k % 4]);
             let y: [f32; LANES] = std::array::from_fn(|k| rows[k / 4]);
-            let ways = dispatch_wide!(self.level, simd => simd.vectorize(
-                #[inline(always)]
-                || {
-                    let [x, y] = [x, y].map(|places| f32x16::simd_from(simd, places));
-                    let ways = scene.camera.ray_lanes(simd, x, y);
-                    ways.map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()])
-                },
-            ));
+            let ways = ray_lanes(self.level, scene, x, y);
             for (to, from) in [&mut self.rays.o, &mut self.rays.d].into_iter().zip(ways) {
                 for axis in 0..3 {
                     to[axis][LANES * part..][..LANES].copy_from_slice(&from[axis]);
@@ -194,6 +187,17 @@ fn place(column: u32, row: u32) -> usize {
     ((row / 4 * 2 + column / 4) * 16 + row % 4 * 4 + column % 4) as usize
 }
 
+/// The origins and the ways of the camera rays through sixteen places on the film, axis by axis.
+fn ray_lanes(level: Level, scene: &Scene, x: [f32; LANES], y: [f32; LANES]) -> [[[f32; LANES]; 3]; 2] {
+    dispatch_wide!(level, simd => simd.vectorize(
+        #[inline(always)]
+        || {
+            let [x, y] = [x, y].map(|places| f32x16::simd_from(simd, places));
+            scene.camera.ray_lanes(simd, x, y).map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()])
+        },
+    ))
+}
+
 /// The camera rays of one pixel, row by row.
 pub(crate) struct PixelRays {
     level: Level,
@@ -218,14 +222,7 @@ impl PixelRays {
     pub fn of(&mut self, scene: &Scene, [i, j]: [u32; 2]) -> &[Ray] {
         let PixelRays { places, rays, .. } = self;
         for (places, rays) in places.iter().zip(rays.chunks_mut(LANES)) {
-            let [o, d] = dispatch_wide!(self.level, simd => simd.vectorize(
-                #[inline(always)]
-                || {
-                    let [x, y] = places.map(|places| f32x16::simd_from(simd, places));
-                    let ways = scene.camera.ray_lanes(simd, x + i as f32, y + j as f32);
-                    ways.map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()])
-                },
-            ));
+            let [o, d] = ray_lanes(self.level, scene, places[0].map(|x| x + i as f32), places[1].map(|y| y + j as f32));
             for (k, ray) in rays.iter_mut().enumerate() {
                 *ray = Ray { o: Vec3::new(o[0][k], o[1][k], o[2][k]), d: Vec3::new(d[0][k], d[1][k], d[2][k]) };
             }

@@ -40,9 +40,8 @@ use tile::Tile;
 pub struct Film {
     size: [u32; 2],
     window: Window,
-    planes: Vec<(Buffer, PlaneVec)>,
-    /// The name of each plane in files.
-    names: Vec<String>,
+    /// Each with its name in files.
+    planes: Vec<(String, Buffer, PlaneVec)>,
 }
 
 /// The pixels of one tile.
@@ -76,29 +75,22 @@ fn copy_rows<T: Copy>(to: &mut [T], starts: impl Iterator<Item = usize>, from: &
 impl Film {
     /// The film of a scene, of which `window` is exposed.
     pub(crate) fn new(scene: &Scene, window: Window, planes: &[Buffer]) -> Self {
-        let names = planes.iter().map(|buffer| scene.buffer_name(*buffer)).collect();
-        Film { size: [scene.width, scene.height], window, planes: empty(planes, window), names }
+        let planes = empty(planes, window).into_iter();
+        let planes = planes.map(|(buffer, numbers)| (scene.buffer_name(buffer), buffer, numbers)).collect();
+        Film { size: [scene.width, scene.height], window, planes }
     }
 
     /// Adds a plane of floats, or replaces it.
     pub(crate) fn put(&mut self, scene: &Scene, buffer: Buffer, numbers: Vec<f32>) {
-        let values = PlaneVec::Floats(numbers);
-        match self.planes.iter_mut().find(|(known, _)| *known == buffer) {
-            Some((_, known)) => *known = values,
-            None => {
-                self.planes.push((buffer, values));
-                self.names.push(scene.buffer_name(buffer));
-            }
-        }
+        self.planes.retain(|(_, known, _)| *known != buffer);
+        self.planes.push((scene.buffer_name(buffer), buffer, PlaneVec::Floats(numbers)));
     }
 
     /// Removes all planes but these, and puts them into this order.
     pub(crate) fn keep(&mut self, buffers: &[Buffer]) {
         let place = |of: Buffer| buffers.iter().position(|buffer| *buffer == of);
-        let planes = std::mem::take(&mut self.planes).into_iter().zip(std::mem::take(&mut self.names));
-        let mut kept: Vec<_> = planes.filter_map(|plane| Some((place(plane.0.0)?, plane))).collect();
-        kept.sort_by_key(|(place, _)| *place);
-        (self.planes, self.names) = kept.into_iter().map(|(_, plane)| plane).unzip();
+        self.planes.retain(|(_, buffer, _)| place(*buffer).is_some());
+        self.planes.sort_by_key(|(_, buffer, _)| place(*buffer));
     }
 
     /// Copies the pixels of a tile.
@@ -106,7 +98,7 @@ impl Film {
         let Tile { x, y, width, height } = from.tile;
         let (left, top) = (x - self.window.x, y - self.window.y);
         let first = |row: u32| (top + row) as usize * self.window.width as usize + left as usize;
-        for ((buffer, to), (_, from)) in self.planes.iter_mut().zip(&from.planes) {
+        for ((_, buffer, to), (_, from)) in self.planes.iter_mut().zip(&from.planes) {
             let channels = buffer.plane().channels().len();
             let (starts, length) = ((0..height).map(|row| first(row) * channels), width as usize * channels);
             match (to, from) {
@@ -129,13 +121,13 @@ impl Film {
 
     /// The buffers that it holds: [`RenderSettings::buffers`](super::RenderSettings::buffers), in their order.
     pub fn planes(&self) -> impl Iterator<Item = Buffer> {
-        self.planes.iter().map(|(buffer, _)| *buffer)
+        self.planes.iter().map(|(_, buffer, _)| *buffer)
     }
 
     /// The values of a plane; `None` if it was not rendered.
     pub fn numbers(&self, of: impl Into<Buffer>) -> Option<PlaneNumbers<'_>> {
         let of = of.into();
-        self.planes.iter().find(|(buffer, _)| *buffer == of).map(|(_, values)| values.numbers())
+        self.planes.iter().find(|(_, buffer, _)| *buffer == of).map(|(.., numbers)| numbers.numbers())
     }
 
     /// The numbers of a plane of floats.
@@ -148,7 +140,7 @@ impl Film {
 
     /// Moves out the values of all planes, each with its name, in their order.
     pub fn into_planes(self) -> impl Iterator<Item = (String, Buffer, PlaneVec)> {
-        self.names.into_iter().zip(self.planes).map(|(name, (buffer, numbers))| (name, buffer, numbers))
+        self.planes.into_iter()
     }
 
     /// The work for each pixel; `None` if [`Plane::Rays`] was not rendered.
@@ -171,8 +163,8 @@ impl Film {
         settings: &FileSettings,
         receipt: &Receipt,
     ) -> Result<Vec<u8>, ImageError> {
-        let named = |of: &Buffer| match self.planes.iter().position(|(buffer, _)| buffer == of) {
-            Some(k) => Ok(NamedPlane { name: &self.names[k], plane: of.plane(), numbers: self.planes[k].1.numbers() }),
+        let named = |of: &Buffer| match self.planes.iter().find(|(_, buffer, _)| buffer == of) {
+            Some((name, _, numbers)) => Ok(NamedPlane { name, plane: of.plane(), numbers: numbers.numbers() }),
             None => Err(ImageError::Picture(format!("the film has no plane for {of:?}: it was not asked for"))),
         };
         let planes = planes.iter().map(named).collect::<Result<Vec<_>, _>>()?;

@@ -212,7 +212,7 @@ impl ReceiptSettings {
         render.motion_to = self.motion_to.clone();
         let said = self.light_samples.iter();
         let mut said = said.flat_map(|(count, samples)| std::iter::repeat_n(*samples, *count));
-        for light in LightDesc::in_scene_order_mut(&mut desc.lights) {
+        for light in LightDesc::in_scene_order(&mut desc.lights) {
             if let Some(samples) = said.next() {
                 light.set_samples(samples);
             }

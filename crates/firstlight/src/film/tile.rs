@@ -28,14 +28,6 @@ impl Tile {
     pub fn contains(&self, [i, j]: [u32; 2]) -> bool {
         (self.x..self.x + self.width).contains(&i) && (self.y..self.y + self.height).contains(&j)
     }
-
-    /// The upper left corners of the cells of a grid of the film that the tile has a part of, row by row.
-    pub fn cells(self, side: u32) -> impl Iterator<Item = [u32; 2]> {
-        let starts =
-            move |from: u32, length: u32| (from / side..(from + length).div_ceil(side)).map(move |cell| cell * side);
-        let columns = starts(self.x, self.width);
-        starts(self.y, self.height).flat_map(move |y| columns.clone().map(move |x| [x, y]))
-    }
 }
 
 /// Runs of neighbouring tiles stay together; of a large picture there are about so many runs.
