@@ -93,6 +93,17 @@ pub(super) fn front(
 /// A light and what it faces nearer than this, in metres, are the same point.
 const MIN_DISTANCE: f64 = 1e-9;
 
+/// The largest sine of the angle that radii which a transform moved may be off a right one, and the largest relative
+/// difference of their lengths: others are those of an ellipse or an ellipsoid.
+const MAX_SKEW: f64 = 1e-6;
+
+/// Whether these are radii of something round, each at right angles to all others.
+pub(super) fn are_round(radii: &[DVec3]) -> bool {
+    let is_right = |a: &DVec3, b: &DVec3| a.dot(*b).abs() <= MAX_SKEW * a.length() * b.length();
+    let is_same = |a: &DVec3| (a.length() - radii[0].length()).abs() <= MAX_SKEW * radii[0].length();
+    radii.iter().enumerate().all(|(i, a)| is_same(a) && radii[..i].iter().all(|b| is_right(a, b)))
+}
+
 /// What every area light says beside its name and its shape.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AreaCommon {

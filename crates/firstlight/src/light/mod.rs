@@ -11,9 +11,11 @@ mod sphere;
 mod spot;
 mod tree;
 
+use std::borrow::Borrow;
+
 use crate::color::Rgb;
 use crate::context::CompileContext;
-use crate::describe::{ColorDesc, SamplesDesc, family, words};
+use crate::describe::{ColorDesc, Family, SamplesDesc, family, words};
 use crate::math::{ErrorBound, UNIT_ROUNDOFF, Vec3};
 use crate::transform::TransformDesc;
 
@@ -27,7 +29,7 @@ pub(crate) use samples::{FineCell, SERIES, SeriesPart, with_gaps};
 pub use sphere::{SphereLight, SphereLightDesc};
 pub use spot::{Spot, SpotDesc};
 
-pub(crate) use area::{PointBlock, Points, check_samples};
+pub(crate) use area::{Points, check_samples};
 pub(crate) use bounds::{ContributionBounds, EmissionProfile, ReceiverBounds};
 pub(crate) use tree::{FEW_LIGHTS, LightNode, LightTree, NodeContents};
 
@@ -121,15 +123,9 @@ macro_rules! of_table {
 
 impl LightDesc {
     /// Lights in scene order: kind by kind, in each the order of the text.
-    pub(crate) fn in_scene_order(lights: &[LightDesc]) -> impl Iterator<Item = &LightDesc> {
-        Self::KINDS.iter().flat_map(|kind| lights.iter().filter(move |light| light.kind() == *kind))
-    }
-
-    /// The same, to be changed.
-    pub(crate) fn in_scene_order_mut(lights: &mut [LightDesc]) -> impl Iterator<Item = &mut LightDesc> {
-        let mut lights: Vec<&mut LightDesc> = lights.iter_mut().collect();
-        // Stable: in each kind the order of the text
-        lights.sort_by_key(|light| Self::KINDS.iter().position(|kind| *kind == light.kind()));
+    pub(crate) fn in_scene_order<L: Borrow<LightDesc>>(lights: impl IntoIterator<Item = L>) -> impl Iterator<Item = L> {
+        let mut lights: Vec<L> = lights.into_iter().collect();
+        lights.sort_by_cached_key(|light| light.borrow().kind_index());
         lights.into_iter()
     }
 
@@ -354,16 +350,6 @@ impl Light {
 pub(crate) fn way_error(middle: Vec3, half: Vec3, p: Vec3, error: ErrorBound) -> Vec3 {
     let (far, way) = (middle.abs() + half, (middle - p).abs() + half);
     error.0 + (far + way * 4.0) * UNIT_ROUNDOFF
-}
-
-/// A point of a light's description as the scene keeps it.
-fn moved_point(cx: &mut CompileContext, field: &str, p: [f64; 3], transform: Option<&TransformDesc>) -> Vec3 {
-    cx.point(field, p);
-    let world = match TransformDesc::compile_field(transform, cx) {
-        Some(world_from_object) => cx.moved_point(world_from_object, p.into()),
-        None => p.into(),
-    };
-    cx.local(world).as_vec3()
 }
 
 /// `color` x `strength`, checked; `factor` is what the kind of light makes of it.

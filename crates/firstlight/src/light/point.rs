@@ -1,8 +1,8 @@
 //! Point lights.
 
-use super::{Falloff, Light, LightKind, light_table, moved_point, scaled};
+use super::{Falloff, Light, LightKind, light_table, scaled};
 use crate::context::CompileContext;
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 use crate::transform::TransformDesc;
 
 light_table! {
@@ -36,7 +36,12 @@ pub struct Point {
 
 impl PointDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext) -> Light {
-        let position = moved_point(cx, "position", self.position, self.transform.as_deref());
+        cx.point("position", self.position);
+        let mut position = DVec3::from(self.position);
+        if let Some(world_from_object) = TransformDesc::compile_field(self.transform.as_deref(), cx) {
+            position = cx.moved_point(world_from_object, position);
+        }
+        let position = cx.local(position).as_vec3();
         let scale = scaled(cx, self.color, self.strength, self.falloff.factor());
         let kind = LightKind::Point(Point { position, physical: self.falloff == Falloff::Physical });
         Light::new(kind, [scale; 2], self.shadows, false)

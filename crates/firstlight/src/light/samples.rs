@@ -23,11 +23,10 @@ impl SampleSet {
     pub(crate) fn allows(self, count: u32) -> Result<(), String> {
         let side = count.isqrt();
         match self {
-            SampleSet::Sobol | SampleSet::Uniform => Ok(()),
-            SampleSet::Grid | SampleSet::Stratified if side * side == count => Ok(()),
-            SampleSet::Grid | SampleSet::Stratified => {
+            SampleSet::Grid | SampleSet::Stratified if side * side != count => {
                 Err(format!("give a square number, such as {} or {}", side * side, (side + 1) * (side + 1)))
             }
+            _ => Ok(()),
         }
     }
 

@@ -108,14 +108,7 @@ impl Spot {
         let between = self.axis + l * inverse_distance;
         let inside = self.outer - 0.5 * between.dot(between);
         // A hard rim has an infinite slope: the product is infinite inside and no number on the rim itself
-        let fade = inside * self.inverse_fade;
-        let fade = if !(inside > 0.0) {
-            0.0
-        } else if fade < 1.0 {
-            fade
-        } else {
-            1.0
-        };
+        let fade = if inside > 0.0 { (inside * self.inverse_fade).min(1.0) } else { 0.0 };
         let cone = fade * fade;
         if self.physical { cone * (inverse_distance * inverse_distance) } else { cone }
     }

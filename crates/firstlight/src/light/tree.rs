@@ -14,7 +14,7 @@ use super::samples::mix;
 use super::{AreaShape, Light, LightKind};
 use crate::color::Rgb;
 use crate::material::{Colors, Lobe, Moments};
-use crate::math::{DVec3, Vec3};
+use crate::math::{DMat3, DVec3, Mat3, Vec3};
 
 /// Up to so many lights are all evaluated at every point; a scene with more has a light tree.
 pub(crate) const FEW_LIGHTS: usize = 16;
@@ -42,8 +42,8 @@ pub(crate) struct LightNode {
     /// Whether all channels have the same `centroid` and `mean_normal`.
     is_gray: bool,
     /// For each channel, the mean of the products of coordinates about the centroid, in square metres, the lights' own
-    /// extent included: xx, yy, zz, xy, yz, zx.
-    covariance: [[f32; 6]; 3],
+    /// extent included.
+    covariance: [Mat3; 3],
     /// For each channel, the sum of power x distance^2 from the centroid, the lights' own extent included.
     second_moment: Rgb,
     /// The same of distance^3.
@@ -138,7 +138,7 @@ struct TreeLight {
     power: Rgb,
     center: Vec3,
     /// The mean of the products of coordinates of its own points about its center, in square metres.
-    covariance: [f64; 6],
+    covariance: DMat3,
     /// The largest distance of its points from its center, in metres.
     radius: f64,
     shadows: bool,
@@ -147,22 +147,19 @@ struct TreeLight {
 impl TreeLight {
     fn new(index: u32, light: &Light, class: u32) -> TreeLight {
         let (bounds, strength) = LightBounds::of(light);
-        let sum = |a: DVec3, b: DVec3, factor: f64| {
-            let (a, b) = (products(a), products(b));
-            std::array::from_fn(|i| (a[i] + b[i]) * factor)
-        };
         let (covariance, radius) = match &light.kind {
             LightKind::Area(area) => match &area.shape {
-                AreaShape::Rectangle(r) => (sum(r.e0, r.e1, 1.0 / 12.0), 0.5 * (r.e0.length() + r.e1.length())),
-                AreaShape::Disk(disk) => (sum(disk.a, disk.b, 0.25), disk.radius),
+                AreaShape::Rectangle(r) => {
+                    ((products(r.e0) + products(r.e1)) * (1.0 / 12.0), 0.5 * (r.e0.length() + r.e1.length()))
+                }
+                AreaShape::Disk(disk) => ((products(disk.a) + products(disk.b)) * 0.25, disk.radius),
                 // From outside its light is that of a point
-                AreaShape::Sphere(sphere) if area.physical => ([0.0; 6], sphere.radius),
+                AreaShape::Sphere(sphere) if area.physical => (DMat3::ZERO, sphere.radius),
                 AreaShape::Sphere(sphere) => {
-                    let third = sphere.radius * sphere.radius / 3.0;
-                    ([third, third, third, 0.0, 0.0, 0.0], sphere.radius)
+                    (DMat3::from_diagonal(DVec3::splat(sphere.radius * sphere.radius / 3.0)), sphere.radius)
                 }
             },
-            LightKind::Point(_) | LightKind::Directional(_) | LightKind::Spot(_) => ([0.0; 6], 0.0),
+            LightKind::Point(_) | LightKind::Directional(_) | LightKind::Spot(_) => (DMat3::ZERO, 0.0),
         };
         let kind = bounds.profile as u8 * 2 + u8::from(light.shadows);
         TreeLight {
@@ -178,16 +175,16 @@ impl TreeLight {
     }
 }
 
-/// The products of the coordinates of a vector: xx, yy, zz, xy, yz, zx.
-fn products(v: DVec3) -> [f64; 6] {
-    [v.x * v.x, v.y * v.y, v.z * v.z, v.x * v.y, v.y * v.z, v.z * v.x]
+/// The products of the coordinates of a vector.
+fn products(v: DVec3) -> DMat3 {
+    DMat3::from_cols(v * v.x, v * v.y, v * v.z)
 }
 
 impl LightNode {
     fn new(bounds: LightBounds, contents: NodeContents, representative: u32, lights: &[TreeLight]) -> LightNode {
         let (mut centroid, mut mean_normal) = ([lights[0].center; 3], [lights[0].bounds.axes.axis; 3]);
         let [mut power, mut second, mut third, mut normal] = [[0.0f32; 3]; 4];
-        let mut covariance = [[0.0f32; 6]; 3];
+        let mut covariance = [Mat3::ZERO; 3];
         for channel in 0..3 {
             // In f64: a hundred thousand lights far from the origin
             let power_of = |light: &TreeLight| f64::from(light.power.to_array()[channel]);
@@ -204,19 +201,17 @@ impl LightNode {
             }
             (centroid[channel], mean_normal[channel]) = ((at / sum).as_vec3(), (n / sum).as_vec3());
             power[channel] = sum as f32;
-            let (mut two, mut three, mut c, mut moments) = (0.0f64, 0.0f64, 0.0f64, [0.0f64; 6]);
+            let (mut two, mut three, mut c, mut moments) = (0.0f64, 0.0f64, 0.0f64, DMat3::ZERO);
             for light in lights {
                 let p = power_of(light);
                 let v = (light.center - centroid[channel]).as_dvec3();
-                for (moment, (own, extent)) in moments.iter_mut().zip(products(v).into_iter().zip(light.covariance)) {
-                    *moment += p * (own + extent);
-                }
+                moments += (products(v) + light.covariance) * p;
                 let far = v.length() + light.radius;
                 two += p * far * far;
                 three += p * far * far * far;
                 c += p * far * f64::from((light.bounds.axes.axis - mean_normal[channel]).length());
             }
-            covariance[channel] = moments.map(|v| (v / sum) as f32);
+            covariance[channel] = (moments / sum).as_mat3();
             // Positions are rounded
             let rounding = if lights.len() > 1 { f64::from(centroid[channel].abs().max_element() * 1e-6) } else { 0.0 };
             second[channel] = (two * 1.001 + sum * rounding * rounding) as f32;
@@ -318,11 +313,8 @@ impl LightNode {
         let d = l * one;
         let (cos, normal) = (ns.dot(d), self.mean_normal[channel]);
         // The second derivatives, contracted with the covariance
-        let [xx, yy, zz, xy, yz, zx] = self.covariance[channel];
-        let times = |v: Vec3| {
-            Vec3::new(xx * v.x + xy * v.y + zx * v.z, xy * v.x + yy * v.y + yz * v.z, zx * v.x + yz * v.y + zz * v.z)
-        };
-        let (along, trace) = (times(d), xx + yy + zz);
+        let covariance = &self.covariance[channel];
+        let (along, trace) = (*covariance * d, covariance.diagonal().element_sum());
         let (across, deep) = (ns.dot(along), d.dot(along));
         let two = one * one;
         let (weight, diffuse) = match self.bounds.profile {
@@ -331,7 +323,7 @@ impl LightNode {
             // cos cos' / d^2
             EmissionProfile::Cosine => {
                 let out = -normal.dot(d);
-                let (across_out, both) = (-normal.dot(along), -ns.dot(times(normal)));
+                let (across_out, both) = (-normal.dot(along), -ns.dot(*covariance * normal));
                 let second = both - 4.0 * (cos * across_out + out * across) + cos * out * (12.0 * deep - 2.0 * trace);
                 (out.max(0.0) * two, (cos * out + two * second) * two)
             }
