@@ -8,7 +8,7 @@ use super::view::ShadowView;
 use crate::accel::{RayPacket16, dispatch_all};
 use crate::math::{LANES, ShadowRay, UNIT_ROUNDOFF, Vec3, least_and_most};
 use crate::scene::{Scene, ShadowMesh, ShadowRays};
-use crate::shape::{LightSeen, SeenParts, SeenTriangle};
+use crate::shape::{LightSeen, SeenParts, SeenTriangle, bits};
 
 impl ShadowView {
     /// Fills [`hidden`](Self::hidden) with the samples that triangles, solids and point sets hide, and those that are
@@ -51,10 +51,7 @@ impl ShadowView {
         // From the order of the blocks to that of the light's samples
         self.hidden.resize(count, 0);
         for (block, hidden) in target.blocks.iter().zip(&self.in_space) {
-            let mut rest = hidden & block.present;
-            while rest != 0 {
-                let lane = rest.trailing_zeros() as usize % LANES;
-                rest &= rest - 1;
+            for lane in bits(u64::from(hidden & block.present)) {
                 let k = block.sample[lane] as usize;
                 self.hidden[k / LANES] |= 1 << (k % LANES);
             }
@@ -68,14 +65,11 @@ impl ShadowView {
         let seen = target.hull.from(point.p);
         let size = point.horizon.abs();
         let wrong = (size.x + size.y + size.z) * seen.longest * (64.0 * UNIT_ROUNDOFF);
-        let middle = point.horizon.dot(seen.l);
-        let [a, b, c] = seen.axes;
-        let slopes = [point.horizon.dot(a), point.horizon.dot(b), point.horizon.dot(c)];
-        if middle - (slopes[0].abs() + slopes[1].abs() + slopes[2].abs()) < wrong {
+        let (middle, reach) = seen.range(point.horizon);
+        if middle - reach < wrong {
+            let slopes = seen.axes.map(|axis| point.horizon.dot(axis));
             for (block, hidden) in target.blocks.iter().zip(&mut self.in_space) {
-                let x = f32x16::load_array_ref(simd, &block.at[0]);
-                let y = f32x16::load_array_ref(simd, &block.at[1]);
-                let z = f32x16::load_array_ref(simd, &block.at[2]);
+                let [x, y, z] = [0, 1, 2].map(|axis: usize| f32x16::load_array_ref(simd, &block.at[axis]));
                 let height = z * slopes[2] + (y * slopes[1] + (x * slopes[0] + middle));
                 *hidden |= height.simd_lt(-wrong).to_bitmask() as u16;
             }
@@ -116,10 +110,7 @@ impl ShadowView {
                     break;
                 }
                 let verdict = triangle.cells(simd, &cells.middle, &cells.half, &parts);
-                let mut some = (verdict.hidden | verdict.unsure) & open;
-                while some != 0 {
-                    let i = some.trailing_zeros() as usize % LANES;
-                    some &= some - 1;
+                for i in bits(u64::from((verdict.hidden | verdict.unsure) & open)) {
                     let (block, hidden) = (&target.blocks[places[i] as usize], &mut self.in_space[places[i] as usize]);
                     if verdict.hidden >> i & 1 == 1 {
                         *hidden = u16::MAX;

@@ -140,24 +140,19 @@ impl Shaft {
         let pad = reach * BEAM_PAD;
         let largest = self.low.abs().max(self.high.abs()).max_element();
         let least = (largest * SMALLEST).max(TINY);
-        let line = |axis: usize| {
-            let (d, from) = (self.low[axis], min[axis]);
-            let d = if d.abs() < least { -least } else { d };
+        // Of the low side, -1: from + s d <= high plane + pad; of the high side, 1: from + s d >= low plane - pad
+        let line = |d: f32, from: f32, side: f32| {
+            let d = if d.abs() < least { side * least } else { d };
             let r = 1.0 / d;
-            // from + s d <= high plane + pad
-            let low = Line { r, c: (pad - from) * r, enters: d < 0.0 };
-            let (d, from) = (self.high[axis], max[axis]);
-            let d = if d.abs() < least { least } else { d };
-            let r = 1.0 / d;
-            // from + s d >= low plane - pad
-            let high = Line { r, c: -(from + pad) * r, enters: d > 0.0 };
-            [low, high]
+            Line { r, c: (-side * pad - from) * r, enters: d * side > 0.0 }
         };
+        let lines =
+            [0, 1, 2].map(|axis| [line(self.low[axis], min[axis], -1.0), line(self.high[axis], max[axis], 1.0)]);
         let horizon = self.horizon.map(|Horizon { n, least }| {
             let below = least - n.as_dvec3().dot(center.as_dvec3());
             (n, below as f32 - (n.x.abs() + n.y.abs() + n.z.abs()) * (2.0 * pad))
         });
-        TreeShaft { lines: [line(0), line(1), line(2)], s_max: self.s_max, horizon }
+        TreeShaft { lines, s_max: self.s_max, horizon }
     }
 
     /// Whether a box intersects the shaft, in f64 and with `room` as the only padding.

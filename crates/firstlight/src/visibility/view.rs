@@ -127,12 +127,8 @@ impl ShadowView {
             return Visibility::Partial;
         }
         self.gather_others(scene, target, &light, occluders, point);
-        let nothing = self.spheres.is_empty()
-            && self.flats.is_empty()
-            && self.disks.is_empty()
-            && self.triangles.is_empty()
-            && self.others.is_empty();
-        if nothing { Visibility::Full } else { Visibility::Partial }
+        let is_clear = self.spheres.is_empty() && self.flats.is_empty() && self.disks.is_empty() && !self.needs_mask();
+        if is_clear { Visibility::Full } else { Visibility::Partial }
     }
 
     /// Adds the solids and point sets whose boxes intersect the shaft of this point.
@@ -150,21 +146,14 @@ impl ShadowView {
         let shaft = Shaft::of(std::slice::from_ref(point), &[0], &target.hull);
         for &index in &occluders.others {
             let thing = &scene.geometry.placed[index as usize];
-            let bounds = match thing.target {
-                PlacedTarget::Solid(solid) => {
-                    let solid = &scene.geometry.solids[solid as usize];
-                    if let Some((on, n)) = solid.plane()
-                        && stays_before(&thing.placement, on, n, light, point)
-                    {
-                        continue;
-                    }
-                    solid.bounds()
-                }
-                PlacedTarget::Points(points) => scene.geometry.point_sets[points as usize].bounds(),
-                PlacedTarget::Mesh(_) => None,
-            };
+            if let PlacedTarget::Solid(solid) = thing.target
+                && let Some((on, n)) = scene.geometry.solids[solid as usize].plane()
+                && stays_before(&thing.placement, on, n, light, point)
+            {
+                continue;
+            }
             let mut around = Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY };
-            if let Some(bounds) = bounds {
+            if let Some(bounds) = scene.geometry.bounds_of(thing.target) {
                 let start = point.start.as_dvec3();
                 let [low, high] = thing.placement.bounds(bounds);
                 let far = (high - start).abs().max((low - start).abs()).max_element();
@@ -190,24 +179,17 @@ impl ShadowView {
         occluders: &OccluderList,
         point: &Viewpoint,
     ) -> bool {
-        let mut rest = &occluders.leaves[..];
         let mut leaves = std::mem::take(&mut self.leaves);
-        let mut hidden = false;
-        while let Some(&(source, _)) = rest.first() {
-            let count = rest.iter().take_while(|leaf| leaf.0 == source).count();
+        let is_hidden = occluders.leaves.chunk_by(|a, b| a.0 == b.0).any(|of_mesh| {
             leaves.clear();
-            leaves.extend(rest[..count].iter().map(|leaf| leaf.1));
-            rest = &rest[count..];
-            if let Some(mesh) = ShadowMesh::of(&scene.geometry, source, target.light) {
+            leaves.extend(of_mesh.iter().map(|leaf| leaf.1));
+            ShadowMesh::of(&scene.geometry, of_mesh[0].0, target.light).is_some_and(|mesh| {
                 let eye = eye(&mesh, light, point);
-                if classify_leaves(simd, &mesh, &eye, &leaves, point.but.of(source), &mut self.triangles) {
-                    hidden = true;
-                    break;
-                }
-            }
-        }
+                classify_leaves(simd, &mesh, &eye, &leaves, point.but.of(mesh.source), &mut self.triangles)
+            })
+        });
         self.leaves = leaves;
-        hidden
+        is_hidden
     }
 }
 
