@@ -73,8 +73,8 @@ fn roundings(size: f64) -> f64 {
     size * f64::from(UNIT_ROUNDOFF) * f64::from(ROUNDINGS)
 }
 
-/// Whether a camera ray through `pixel` in another scene ends at the point of `center`, which is at `p` there. `front` is
-/// the normal of its front there, of any length.
+/// Whether a camera ray through `pixel` in another scene ends at the point of `center`, which is at `p` there. `front`
+/// is the normal of its front there, of any length.
 fn is_seen(center: &Center, there: &Scene, level: Level, p: DVec3, front: DVec3, pixel: [f64; 2]) -> bool {
     let ray = ray_at(&there.camera, pixel);
     let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());

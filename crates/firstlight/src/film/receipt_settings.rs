@@ -145,14 +145,8 @@ impl ReceiptSettings {
         let color = |text: &str| numbers(text, ' ').map(|linear: [f64; 3]| ColorDesc::from(linear));
         let background = |text: &str| if text == TRANSPARENT { Some(None) } else { color(text).map(Some) };
         let view = from.optional("view", |text| numbers(text, ' ').map(|[around, above]| View::new(around, above)))?;
-        let framing = match view {
-            Some(view) => Some(Framing { view, margin: from.required("margin", number)? }),
-            None => None,
-        };
-        let model = match from.optional("up", UpAxis::from_name)? {
-            Some(up) => Some(ModelSettings { up, smooth_deg: from.optional("smooth_deg", number)?, points: false }),
-            None => None,
-        };
+        let framing = |view| Ok(Framing { view, margin: from.required("margin", number)? });
+        let model = |up| Ok(ModelSettings { up, smooth_deg: from.optional("smooth_deg", number)?, points: false });
         let crop =
             |text: &str| numbers(text, ',').map(|[x, y, width, height]: [u32; 4]| Window { x, y, width, height });
         let visibility = |text: &str| match text {
@@ -165,8 +159,8 @@ impl ReceiptSettings {
             version: from.required("version", text)?,
             scene_hash: from.required("scene_hash", text)?,
             time: from.optional("time", number)?.unwrap_or(0.0),
-            framing,
-            model,
+            framing: view.map(framing).transpose()?,
+            model: from.optional("up", UpAxis::from_name)?.map(model).transpose()?,
             tolerance: from.optional("tolerance", number)?,
             display: from.optional("display", number)?,
             buffers: from.optional("buffers", buffers)?.unwrap_or_else(|| vec![Plane::Color.into()]),

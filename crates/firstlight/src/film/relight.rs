@@ -170,15 +170,15 @@ fn changed(lights: &[FiledLight], changes: &[(String, LightChange)]) -> Result<V
             LightChange::Strength(strength) => scale.strength = *strength,
             LightChange::Color(color) => scale.color = color.linear,
         }
+        let refused = |fault: String| Err(RelightError(format!("light {name}: its {fault}")));
         if !(0.0..=MAX_STRENGTH).contains(&scale.strength) {
-            let message = format!("light {name}: its strength would be {}, which is outside [0, 1e15]", scale.strength);
-            return Err(RelightError(message));
+            return refused(format!("strength would be {}, which is outside [0, 1e15]", scale.strength));
         }
         if let Some(channel) = scale.color.into_iter().find(|channel| !(0.0..).contains(channel)) {
-            return Err(RelightError(format!("light {name}: its colour would be {channel}, which is below 0 or none")));
+            return refused(format!("colour would be {channel}, which is below 0 or none"));
         }
         if !scale.exact().iter().all(|c| *c <= MAX_LIGHT) {
-            return Err(RelightError(format!("light {name}: its colour times its strength would pass 1e30")));
+            return refused("colour times its strength would pass 1e30".into());
         }
         let sent_nothing = |(before, after): (f64, f64)| before == 0.0 && after > 0.0;
         if lights[at].scale.exact().into_iter().zip(scale.exact()).any(sent_nothing) {

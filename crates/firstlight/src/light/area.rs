@@ -198,7 +198,7 @@ pub struct Area {
     middle: Vec3,
     half: Vec3,
     /// Unit normal of the front, where all of it faces one way.
-    n: Option<Vec3>,
+    pub(super) n: Option<Vec3>,
     set: SampleSet,
     count: u32,
     seed: u32,
@@ -305,11 +305,6 @@ impl Area {
         self.count as usize
     }
 
-    /// Its area: [`AreaShape::measure`].
-    pub fn measure(&self) -> f64 {
-        self.shape.measure()
-    }
-
     /// A point of it and the unit normal of its front, if it is flat and emits to that side alone.
     pub(crate) fn front(&self) -> Option<(DVec3, DVec3)> {
         self.shape.front().filter(|_| !self.both_sides)
@@ -322,12 +317,7 @@ impl Area {
 
     /// What all of its points together stand for.
     pub(crate) fn stands_for(&self) -> f32 {
-        if self.physical { self.measure() as f32 } else { 1.0 }
-    }
-
-    /// Unit normal of the front, where all of it faces one way.
-    pub(crate) fn normal(&self) -> Option<Vec3> {
-        self.n
+        if self.physical { self.shape.measure() as f32 } else { 1.0 }
     }
 
     /// The sampled points.

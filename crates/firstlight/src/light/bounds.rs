@@ -133,7 +133,7 @@ impl LightBounds {
                     (false, _, true) => EmissionProfile::Constant,
                     _ => EmissionProfile::Other,
                 };
-                let normal = area.normal().filter(|_| !area.both_sides);
+                let normal = area.n.filter(|_| !area.both_sides);
                 let axes = normal.map_or(DirectionCone::SPHERE, DirectionCone::of);
                 (LightBounds { low, high, axes, ..at(profile, low, !area.physical) }, strength as f32)
             }

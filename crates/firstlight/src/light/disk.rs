@@ -116,16 +116,6 @@ impl DiskLightDesc {
     }
 }
 
-/// The point of the unit disk that stands for a point of the square [-1, 1]^2.
-#[inline(always)]
-fn concentric([x, y]: [f64; 2]) -> [f64; 2] {
-    let is_flat = x.abs() > y.abs();
-    let (r, other) = if is_flat { (x, y) } else { (y, x) };
-    let part = if r == 0.0 { 0.0 } else { other / r };
-    let (sin, cos) = sin_cos_of_turns(0.125 * if is_flat { part } else { 2.0 - part });
-    [r * cos, r * sin]
-}
-
 impl DiskLight {
     /// The point that stands for `uv` of the unit square: squares around its middle become circles.
     ///
@@ -133,8 +123,11 @@ impl DiskLight {
     #[inline(always)]
     pub(super) fn point(&self, uv: [f64; 2]) -> DVec3 {
         let [x, y] = uv.map(|w| 2.0 * w - 1.0);
-        let [x, y] = concentric([x, y]);
-        self.center + self.a * x + self.b * y
+        let is_flat = x.abs() > y.abs();
+        let (r, other) = if is_flat { (x, y) } else { (y, x) };
+        let part = if r == 0.0 { 0.0 } else { other / r };
+        let (sin, cos) = sin_cos_of_turns(0.125 * if is_flat { part } else { 2.0 - part });
+        self.center + self.a * (r * cos) + self.b * (r * sin)
     }
 
     #[inline(always)]

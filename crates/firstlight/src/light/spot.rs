@@ -63,11 +63,8 @@ impl SpotDesc {
         }
         let axis = to - from;
         if !(axis.length() >= 1e-9) {
-            let message = format!(
-                "{} is the light's position {}: the cone has no axis",
-                show(&to.to_array()),
-                show(&from.to_array())
-            );
+            let (to, from) = (show(&to.to_array()), show(&from.to_array()));
+            let message = format!("{to} is the light's position {from}: the cone has no axis");
             cx.error("look_at", message, Some("move one of them"));
         }
         let hint = "the cone is the full angle, not half";

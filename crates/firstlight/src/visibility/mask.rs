@@ -63,8 +63,7 @@ impl ShadowView {
     fn mask_triangles<S: Simd>(&mut self, simd: S, scene: &Scene, target: &Target, point: &Viewpoint) {
         // Samples below the horizon count as hidden
         let seen = target.hull.from(point.p);
-        let size = point.horizon.abs();
-        let wrong = (size.x + size.y + size.z) * seen.longest * (64.0 * UNIT_ROUNDOFF);
+        let wrong = point.horizon.abs().element_sum() * seen.longest * (64.0 * UNIT_ROUNDOFF);
         let (middle, reach) = seen.range(point.horizon);
         if middle - reach < wrong {
             let slopes = seen.axes.map(|axis| point.horizon.dot(axis));
@@ -168,11 +167,11 @@ fn shadow_rays<'a, S: Simd>(
         l.store_slice(&mut shadows.rays.d[axis]);
     }
     // `ShadowRay::end`, operation by operation
-    let o = point.start.abs();
+    let o = point.start.abs().element_sum();
     let length = l[0].abs() + l[1].abs() + l[2].abs();
     let plane = from[0].to.plane;
     let approach = if plane == Vec3::ZERO { length } else { (l[0] * plane.x + l[1] * plane.y + l[2] * plane.z).abs() };
-    let end = -((length + (o.x + o.y + o.z)) / approach * (32.0 * UNIT_ROUNDOFF)) + 1.0;
+    let end = -((length + o) / approach * (32.0 * UNIT_ROUNDOFF)) + 1.0;
     end.store_slice(&mut shadows.t_end);
     shadows
 }

@@ -7,7 +7,6 @@ use super::shaft::{Horizon, Shaft};
 use super::target::Target;
 use crate::accel::dispatch_all;
 use crate::ids::LightId;
-use crate::math::Vec3;
 use crate::scene::{Geometry, MeshNumber, PlacedTarget, Scene, ShadowMesh, UpperItem};
 use crate::shape::{Parallelogram, PlaneSide, Sphere};
 
@@ -188,35 +187,6 @@ impl OccluderList {
             }
         }
         true
-    }
-
-    /// Gathers from the trees the occluders between a light and a patch of surface, `curved` or flat, of radius `reach`
-    /// around `point`: at most `cap` leaves.
-    #[allow(clippy::too_many_arguments, reason = "a light of a scene, and a patch")]
-    pub fn gather_around(
-        &mut self,
-        level: Level,
-        scene: &Scene,
-        target: &Target,
-        point: &Viewpoint,
-        reach: f32,
-        curved: bool,
-        cap: usize,
-    ) {
-        let mut points = [*point; 2];
-        if reach > 0.0 {
-            for (point, side) in points.iter_mut().zip([-1.0, 1.0]) {
-                point.p += Vec3::splat(reach * side);
-                point.start += Vec3::splat(reach * side);
-            }
-            if curved {
-                // The horizon differs over the patch: the shaft has none
-                points[1].horizon = -point.horizon;
-            }
-        }
-        let indices = &[0, 1][..if reach > 0.0 { 2 } else { 1 }];
-        let shaft = Shaft::of(&points, indices, &target.hull);
-        self.gather_in(level, scene, target, &shaft, cap);
     }
 
     /// Gathers from the trees what intersects a shaft to a light: at most `cap` leaves. The same with every instruction

@@ -28,6 +28,20 @@ pub(crate) struct Horizon {
     pub least: f64,
 }
 
+impl Horizon {
+    /// That of some points, if all have the same.
+    pub fn shared<'a>(mut points: impl Iterator<Item = &'a Viewpoint>) -> Option<Horizon> {
+        let least = |point: &Viewpoint| {
+            let n = point.horizon.as_dvec3();
+            n.dot(point.p.as_dvec3()).min(n.dot(point.start.as_dvec3()))
+        };
+        let first = points.next()?;
+        points.try_fold(Horizon { n: first.horizon, least: least(first) }, |Horizon { n, least: before }, point| {
+            (point.horizon == n).then(|| Horizon { n, least: before.min(least(point)) })
+        })
+    }
+}
+
 /// The hull of a box of points and a light.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shaft {
@@ -87,21 +101,25 @@ impl Shaft {
     /// The shaft from some of the points to a light.
     pub fn of(points: &[Viewpoint], indices: &[u32], hull: &LightHull) -> Shaft {
         let (mut starts, mut apart) = (Aabb::EMPTY, Vec3::ZERO);
-        let first = &points[indices[0] as usize];
-        let mut horizon = Some(Horizon { n: first.horizon, least: f64::INFINITY });
-        for point in indices.iter().map(|i| &points[*i as usize]) {
+        let points = || indices.iter().map(|i| &points[*i as usize]);
+        for point in points() {
             // The tests of some shapes start at the point itself
             starts = starts.with(point.start).with(point.p);
             apart = apart.max(point.apart());
-            match &mut horizon {
-                Some(horizon) if horizon.n == point.horizon => {
-                    let height = |v: Vec3| point.horizon.as_dvec3().dot(v.as_dvec3());
-                    horizon.least = horizon.least.min(height(point.p)).min(height(point.start));
-                }
-                _ => horizon = None,
-            }
         }
-        Shaft { horizon, ..Shaft::between(starts, hull, apart) }
+        Shaft { horizon: Horizon::shared(points()), ..Shaft::between(starts, hull, apart) }
+    }
+
+    /// The shaft from a patch of surface, `curved` or flat, of radius `reach` around `point`, to a light.
+    pub fn around(point: &Viewpoint, reach: f32, curved: bool, hull: &LightHull) -> Shaft {
+        let mut points = [*point; 2];
+        for (point, side) in points.iter_mut().zip([-1.0, 1.0]) {
+            point.p += Vec3::splat(reach * side);
+            point.start += Vec3::splat(reach * side);
+        }
+        let shaft = Shaft::of(&points, &[0, 1], hull);
+        // The horizon differs over a curved patch: the shaft has none
+        if curved && reach > 0.0 { Shaft { horizon: None, ..shaft } } else { shaft }
     }
 
     /// The same shaft in the object space of `placement`.

@@ -221,8 +221,7 @@ fn classify_leaves<S: Simd>(
 /// The point and the light in the object space of a mesh.
 fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
     // Rays end short of the light by the rounding of both ends: `ShadowRay::end`
-    let o = point.start.abs();
-    let o = o.x + o.y + o.z;
+    let o = point.start.abs().element_sum();
     let part = if light.plane == Vec3::ZERO {
         1.0 + o / light.shortest
     } else {
@@ -273,6 +272,5 @@ fn stays_before(placement: &Placement, on: DVec3, n: DVec3, light: &LightSeen, p
 #[inline(always)]
 fn is_below(light: &LightSeen, n: Vec3) -> bool {
     let (middle, reach) = light.range(n);
-    let size = n.abs();
-    middle + reach < -(size.x + size.y + size.z) * light.longest * DOT
+    middle + reach < -n.abs().element_sum() * light.longest * DOT
 }

@@ -53,7 +53,8 @@ impl DirectLighting<'_> {
         let (target, trees) = (&lights.targets[index], &mut self.occluders);
         match points {
             [point] => {
-                trees.gather_around(self.level, scene, target, point, reach, turn > 0.0, LEAVES);
+                let shaft = Shaft::around(point, reach, turn > 0.0, &target.hull);
+                trees.gather_in(self.level, scene, target, &shaft, LEAVES);
                 trees.others.retain(|thing| !is_beside(scene, target, point, reach, turn, *thing));
                 // What does not rise over the one horizon of a flat footprint occludes nothing
                 if reach > 0.0 && turn == 0.0 && point.but != Facet::NONE {
