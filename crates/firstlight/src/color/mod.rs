@@ -37,6 +37,18 @@ impl Rgb {
         Self { r, g, b }
     }
 
+    /// Red, green and blue.
+    #[inline(always)]
+    pub(crate) fn from_array([r, g, b]: [f32; 3]) -> Self {
+        Rgb { r, g, b }
+    }
+
+    /// Red, green and blue.
+    #[inline(always)]
+    pub(crate) fn to_array(self) -> [f32; 3] {
+        [self.r, self.g, self.b]
+    }
+
     /// The same value in all channels.
     #[inline(always)]
     pub const fn gray(v: f32) -> Self {

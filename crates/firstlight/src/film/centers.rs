@@ -11,19 +11,11 @@ use super::motion;
 use super::{CenterValue, FilmTile};
 use crate::camera::Frame;
 use crate::color::Rgb;
-use crate::image::Plane;
+use crate::image::{Buffer, Plane};
+use crate::light::Light;
 use crate::math::{DVec3, Ray, Vec3};
 use crate::scene::{Hit, ObjectSpace, Scene};
 use crate::shape::{RayDifferential, ShadowTerminator, SurfaceInteraction};
-
-/// Fills the planes of tiles from centre rays, for one thread.
-struct Centers<'a> {
-    scene: &'a Scene,
-    /// The scene that motion leads to.
-    there: Option<&'a Scene>,
-    level: Level,
-    hits: PixelHits,
-}
 
 /// The hit of a centre ray, or of another camera ray.
 pub(super) struct Center<'a> {
@@ -31,6 +23,8 @@ pub(super) struct Center<'a> {
     ray: Ray,
     differential: RayDifferential,
     pub hit: Hit,
+    /// The light that it is on, if any.
+    light: Option<&'a Light>,
     /// The surface, computed at its first use; `None` on a light.
     surface: OnceCell<Option<SurfaceInteraction>>,
 }
@@ -38,70 +32,55 @@ pub(super) struct Center<'a> {
 /// Fills the planes of a tile that come from centre rays. Returns the number of rays that were traced.
 pub(crate) fn fill(scene: &Scene, level: Level, film: &mut FilmTile) -> u64 {
     let there = scene.motion.as_deref().map(|motion| &motion.there);
-    let has = |film: &FilmTile, backward: bool| {
-        let of_center = |plane: Plane| plane.is_of_center() && (plane == Plane::MotionBackward) == backward;
-        film.planes().iter().any(|buffer| of_center(buffer.plane()))
-    };
-    let mut rays = 0;
-    if has(film, false) {
-        let says = |plane: Plane| (plane != Plane::MotionBackward).then_some(plane);
-        rays += Centers::new(scene, there, level).fill(film, says);
-    }
-    if let (true, Some(there)) = (has(film, true), there) {
-        // Of the other picture, the way to this one
-        let says = |plane: Plane| (plane == Plane::MotionBackward).then_some(Plane::Motion);
-        rays += Centers::new(there, Some(scene), level).fill(film, says);
-    }
-    rays
+    // The motion back is that of the scene at its end, to this one
+    let (backward, forward): (Vec<_>, Vec<_>) = (0..)
+        .zip(film.planes().into_iter().map(Buffer::plane))
+        .filter(|(_, plane)| plane.is_of_center())
+        .partition(|(_, plane)| *plane == Plane::MotionBackward);
+    let back: Vec<_> = backward.into_iter().map(|(number, _)| (number, Plane::Motion)).collect();
+    let to_here = there.map_or(0, |there| fill_some(there, Some(scene), level, film, &back));
+    fill_some(scene, there, level, film, &forward) + to_here
 }
 
-impl<'a> Centers<'a> {
-    fn new(scene: &'a Scene, there: Option<&'a Scene>, level: Level) -> Self {
-        Centers { scene, there, level, hits: PixelHits::new(level, 1) }
+/// Fills the planes of a tile with these numbers as those of centre rays. `there` is the scene that motion leads to.
+fn fill_some(
+    scene: &Scene,
+    there: Option<&Scene>,
+    level: Level,
+    film: &mut FilmTile,
+    planes: &[(usize, Plane)],
+) -> u64 {
+    if planes.is_empty() {
+        return 0;
     }
-
-    /// Fills planes of a tile; `asks` maps a buffer to the plane of centre rays that it is, if it is one.
-    fn fill(&mut self, film: &mut FilmTile, asks: impl Fn(Plane) -> Option<Plane>) -> u64 {
-        let (scene, there, level) = (self.scene, self.there, self.level);
-        let (tile, side) = (film.tile, self.hits.side());
-        // The planes of the film that come from centre rays
-        let planes: Vec<(usize, Plane)> = (0..)
-            .zip(film.planes())
-            .filter(|(_, buffer)| buffer.plane().is_of_center())
-            .filter_map(|(number, buffer)| Some((number, asks(buffer.plane())?)))
-            .collect();
-        let asked = |of: Plane| planes.iter().any(|(_, plane)| *plane == of);
-        let (asks_motion, asks_texture) = (asked(Plane::Motion), asked(Plane::Albedo));
-        for top in (0..tile.height).step_by(side as usize) {
-            for left in (0..tile.width).step_by(side as usize) {
-                let (w, h) = ((tile.width - left).min(side), (tile.height - top).min(side));
-                let [x, y] = [tile.x + left, tile.y + top];
-                self.hits.trace(scene, x, y, w, h);
-                for (j, i) in (0..h).flat_map(|j| (0..w).map(move |i| (j, i))) {
-                    let ray = self.hits.ray(i, j);
-                    let center = self.hits.get(i, j, 0, 0).map(|hit| {
-                        let differential =
-                            if asks_texture { grid_ray(scene, 1, x + i, y + j).1 } else { RayDifferential::default() };
-                        Center::new(scene, ray, differential, hit)
-                    });
-                    for (number, plane) in &planes {
-                        let said = match (&center, there) {
-                            (Some(center), Some(there)) if *plane == Plane::Motion => {
-                                CenterValue::Floats(motion::of_thing(center, there, level))
-                            }
-                            (None, Some(there)) if *plane == Plane::Motion => {
-                                CenterValue::Floats(motion::of_nothing(scene, there, &ray, level))
-                            }
-                            (Some(center), _) => center.says(*plane),
-                            (None, _) => nothing(*plane),
-                        };
-                        film.set_center(*number, [left + i, top + j], said);
+    let tile = film.tile;
+    let has = |of: Plane| planes.iter().any(|(_, plane)| *plane == of);
+    let (has_motion, has_texture) = (has(Plane::Motion), has(Plane::Albedo));
+    let mut hits = PixelHits::new(level, 1);
+    for block in tile.parts(hits.side(), 1) {
+        hits.trace(scene, block);
+        for [i, j] in block.pixels() {
+            let ray = hits.ray([i, j]);
+            let center = hits.get([i, j], 0, 0).map(|hit| {
+                let differential = if has_texture { grid_ray(scene, 1, i, j).1 } else { RayDifferential::default() };
+                Center::new(scene, ray, differential, hit)
+            });
+            for (number, plane) in planes {
+                let value = match (&center, there) {
+                    (Some(center), Some(there)) if *plane == Plane::Motion => {
+                        CenterValue::Floats(motion::of_thing(center, there, level))
                     }
-                }
+                    (None, Some(there)) if *plane == Plane::Motion => {
+                        CenterValue::Floats(motion::of_nothing(scene, there, &ray, level))
+                    }
+                    (Some(center), _) => center.says(*plane),
+                    (None, _) => nothing(*plane),
+                };
+                film.set_center(*number, [i, j], value);
             }
         }
-        u64::from(tile.width) * u64::from(tile.height) * if asks_motion { 2 } else { 1 }
     }
+    u64::from(tile.width) * u64::from(tile.height) * if has_motion { 2 } else { 1 }
 }
 
 /// The value of a plane at a ray without a hit.
@@ -115,14 +94,14 @@ pub(super) fn nothing(plane: Plane) -> CenterValue {
 
 impl<'a> Center<'a> {
     pub fn new(scene: &'a Scene, ray: Ray, differential: RayDifferential, hit: Hit) -> Self {
-        Center { scene, ray, differential, hit, surface: OnceCell::new() }
+        let light = hit.surface.index().checked_sub(scene.geometry.surfaces.len()).map(|light| &scene.lights[light]);
+        Center { scene, ray, differential, hit, light, surface: OnceCell::new() }
     }
 
     /// The surface; `None` on a light. It is not lit, so it is not lifted off its facet.
     fn surface(&self) -> Option<&SurfaceInteraction> {
-        let Center { scene, ray, differential, hit, .. } = self;
-        let is_light = hit.surface.index() >= scene.geometry.surfaces.len();
-        let find = || (!is_light).then(|| scene.surface_with(ray, hit, differential, ShadowTerminator::Hard));
+        let Center { scene, ray, differential, hit, light, .. } = self;
+        let find = || light.is_none().then(|| scene.surface_with(ray, hit, differential, ShadowTerminator::Hard));
         self.surface.get_or_init(find).as_ref()
     }
 
@@ -147,10 +126,9 @@ impl<'a> Center<'a> {
 
     /// The unit normal of the front: of a shape, or of a light.
     pub fn front(&self) -> Vec3 {
-        let Scene { geometry, lights, .. } = self.scene;
-        match self.hit.surface.index().checked_sub(geometry.surfaces.len()) {
-            None => geometry.normals(&self.ray, &self.hit)[0],
-            Some(light) => lights[light].area().map_or(Vec3::ZERO, |area| area.shape.normal_at(self.p())),
+        match self.light {
+            None => self.scene.geometry.normals(&self.ray, &self.hit)[0],
+            Some(light) => light.area().map_or(Vec3::ZERO, |area| area.shape.normal_at(self.p())),
         }
     }
 
@@ -161,10 +139,11 @@ impl<'a> Center<'a> {
 
     /// The geometric and the shading normal, towards the viewer.
     pub fn normals(&self) -> [Vec3; 2] {
-        let Scene { geometry, .. } = self.scene;
-        let is_light = self.hit.surface.index() >= geometry.surfaces.len();
         // Without what else there is to know of the surface
-        let [normal, shading] = if is_light { [self.front(); 2] } else { geometry.normals(&self.ray, &self.hit) };
+        let [normal, shading] = match self.light {
+            None => self.scene.geometry.normals(&self.ray, &self.hit),
+            Some(_) => [self.front(); 2],
+        };
         if normal.dot(-self.ray.d) < 0.0 { [-normal, -shading] } else { [normal, shading] }
     }
 

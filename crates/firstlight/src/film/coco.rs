@@ -65,7 +65,6 @@ impl Coco {
         self.images.push(json!({ "id": image, "file_name": file_name, "width": width, "height": height }));
         for ObjectMasks { id, visible, amodal } in masks {
             let object = id as usize - 1;
-            let visible_fraction = visible.area() as f64 / amodal.area() as f64;
             self.annotations.push(json!({
                 "id": self.annotations.len() + 1,
                 "image_id": image,
@@ -79,7 +78,7 @@ impl Coco {
                 "amodal_segmentation": run_lengths(&amodal),
                 "amodal_area": amodal.area(),
                 "amodal_bbox": amodal.bounds(),
-                "visible_fraction": visible_fraction,
+                "visible_fraction": visible.area() as f64 / amodal.area() as f64,
             }));
         }
     }
@@ -96,13 +95,8 @@ impl Coco {
 
     /// The id of the category of a name.
     fn category(&mut self, name: Option<&str>) -> usize {
-        let own = Self::category_of(name);
-        if let Some(id) = self.categories.get(own) {
-            return *id;
-        }
-        let id = self.categories.len() + 1;
-        self.categories.insert(own.to_owned(), id);
-        id
+        let next = self.categories.len() + 1;
+        *self.categories.entry(Self::category_of(name).to_owned()).or_insert(next)
     }
 
     /// As JSON, an annotation on each line.

@@ -125,57 +125,53 @@ impl<'a> Coverage<'a> {
 
     /// Fills the planes of a tile. `go_on` is called now and then, and stops it with a break.
     pub fn fill(&mut self, film: &mut FilmTile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
-        let (scene, tile, side, n) = (self.scene, film.tile, self.hits.side(), self.scene.antialiasing);
+        let (scene, n) = (self.scene, self.scene.antialiasing);
         let mut traced = 0;
-        for top in (0..tile.height).step_by(side as usize) {
-            for left in (0..tile.width).step_by(side as usize) {
-                let (w, h) = ((tile.width - left).min(side), (tile.height - top).min(side));
-                self.hits.trace(scene, tile.x + left, tile.y + top, w, h);
-                for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
-                    let [i, j] = [tile.x + left + x, tile.y + top + y];
-                    self.met.clear();
-                    for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
-                        let hit = self.hits.get(x, y, column, row);
-                        self.met.extend(hit.map(|hit| ([i * n + column, j * n + row], hit)));
-                    }
-                    self.pixel(film, left + x, top + y);
+        for block in film.tile.parts(self.hits.side(), 1) {
+            self.hits.trace(scene, block);
+            for [i, j] in block.pixels() {
+                self.met.clear();
+                for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
+                    let hit = self.hits.get([i, j], column, row);
+                    self.met.extend(hit.map(|hit| ([i * n + column, j * n + row], hit)));
                 }
-                traced += w * h * n * n;
-                if traced >= QUESTION_EVERY {
-                    traced = 0;
-                    go_on()?;
-                }
+                self.pixel(film, [i, j]);
+            }
+            traced += block.width * block.height * n * n;
+            if traced >= QUESTION_EVERY {
+                traced = 0;
+                go_on()?;
             }
         }
         ControlFlow::Continue(())
     }
 
     /// Fills a pixel of a tile from the hits of its rays.
-    fn pixel(&mut self, film: &mut FilmTile, x: u32, y: u32) {
+    fn pixel(&mut self, film: &mut FilmTile, at: [u32; 2]) {
         let Coverage { scene, asked, met, shares, .. } = self;
         let rays = scene.antialiasing * scene.antialiasing;
         if let Some(plane) = asked.background {
-            film.set_pixel(plane, x, y, &[(rays - met.len() as u32) as f32 / rays as f32]);
+            film.set_pixel(plane, at, &[(rays - met.len() as u32) as f32 / rays as f32]);
         }
         if !asked.objects.is_empty() {
             shares.count(met.iter().map(|(_, hit)| hit.surface.0));
             for (object, count) in &shares.counts {
-                if let Ok(at) = asked.objects.binary_search_by_key(object, |(asked, _)| asked.0) {
-                    film.set_pixel(asked.objects[at].1, x, y, &[*count as f32 / rays as f32]);
+                if let Ok(object) = asked.objects.binary_search_by_key(object, |(asked, _)| asked.0) {
+                    film.set_pixel(asked.objects[object].1, at, &[*count as f32 / rays as f32]);
                 }
             }
         }
         for (matte, plane) in &asked.mattes {
             shares.count(met.iter().filter_map(|(_, hit)| matte.bits_of(scene, hit)));
-            film.set_pixel(*plane, x, y, &shares.ranks(rays as f32));
+            film.set_pixel(*plane, at, &shares.ranks(rays as f32));
         }
         if !asked.means.is_empty() {
-            self.means(film, x, y);
+            self.means(film, at);
         }
     }
 
     /// Fills a pixel of the means: sums in 64 bits, ray by ray.
-    fn means(&mut self, film: &mut FilmTile, x: u32, y: u32) {
+    fn means(&mut self, film: &mut FilmTile, at: [u32; 2]) {
         let Coverage { scene, asked, met, sums, .. } = self;
         sums.fill([0.0; 3]);
         for ([i, j], hit) in &*met {
@@ -191,7 +187,7 @@ impl<'a> Coverage<'a> {
                 0 => floats(nothing(*of)),
                 count => sum.map(|sum| (sum / count as f64) as f32),
             };
-            film.set_pixel(*plane, x, y, &mean[..of.channels().len()]);
+            film.set_pixel(*plane, at, &mean);
         }
     }
 }

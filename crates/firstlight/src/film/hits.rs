@@ -6,6 +6,7 @@
 
 use fearless_simd::{Level, f32x16, prelude::*};
 
+use super::tile::Tile;
 use crate::accel::{Planes, RayTile};
 use crate::math::{LANES, Ray, Vec3, dispatch_wide};
 use crate::scene::{Hit, Nearest, Scene};
@@ -23,7 +24,10 @@ pub(crate) struct PixelHits {
     side: u32,
     /// Rays across.
     across: u32,
-    hits: Vec<Option<Hit>>,
+    /// The pixel that it begins at.
+    first: [u32; 2],
+    /// The nearest hit of each ray.
+    hits: Vec<Nearest>,
     rays: Box<RayTile>,
     found: Box<TileHits>,
     /// The meshes that are placed where the rays of a block go.
@@ -40,7 +44,8 @@ impl PixelHits {
             n,
             side,
             across,
-            hits: vec![None; (across * across) as usize],
+            first: [0; 2],
+            hits: vec![Nearest(None); (across * across) as usize],
             rays: Box::new(RayTile::ZERO),
             found: Box::new(TileHits::new(0.0)),
             meshes: Vec::new(),
@@ -52,23 +57,22 @@ impl PixelHits {
         self.side
     }
 
-    /// Traces the rays of the pixels from (`i`, `j`), `width` x `height` of them, at most [`side`](Self::side).
-    pub fn trace(&mut self, scene: &Scene, i: u32, j: u32, width: u32, height: u32) {
+    /// Traces the rays of some pixels, at most [`side`](Self::side) across and down.
+    pub fn trace(&mut self, scene: &Scene, pixels: Tile) {
         let n = self.n;
-        let (rays_across, rays_down) = (width * n, height * n);
-        for top in (0..rays_down).step_by(BLOCK as usize) {
-            for left in (0..rays_across).step_by(BLOCK as usize) {
-                let (w, h) = ((rays_across - left).min(BLOCK), (rays_down - top).min(BLOCK));
-                self.block(scene, i * n, j * n, left, top, w, h);
-            }
+        let Tile { x, y, width, height } = pixels;
+        self.first = [x, y];
+        for rays in (Tile { x: x * n, y: y * n, width: width * n, height: height * n }).parts(BLOCK, 1) {
+            self.block(scene, rays);
         }
     }
 
-    /// Traces the `w` x `h` rays from (`left`, `top`) of the square that begins at ray (`x`, `y`) of the film.
-    #[allow(clippy::too_many_arguments, reason = "a rectangle in a square on a film")]
-    fn block(&mut self, scene: &Scene, x: u32, y: u32, left: u32, top: u32, w: u32, h: u32) {
+    /// Traces a block of rays, counted on the film.
+    fn block(&mut self, scene: &Scene, rays: Tile) {
         let geometry = &scene.geometry;
-        self.aim(scene, x + left, y + top);
+        self.aim(scene, rays.x, rays.y);
+        let [left, top] = [rays.x - self.first[0] * self.n, rays.y - self.first[1] * self.n];
+        let (w, h) = (rays.width, rays.height);
         let bundle = geometry.world_as_bundle();
         // Whether packets find all hits with placed things too
         let upper_bundle = (bundle || !geometry.has_world()) && {
@@ -96,25 +100,24 @@ impl PixelHits {
                     geometry.meet_trees(self.level, &ray, &mut nearest);
                 }
                 active |= 1 << place;
-                self.hits[at(place)] = nearest.0;
+                self.hits[at(place)] = nearest;
             }
         }
         if bundle {
-            ask_from_here(&mut self.found, active, |place| Nearest(self.hits[at(place)]));
+            ask_from_here(&mut self.found, active, |place| self.hits[at(place)].limit());
             let met = geometry.meet_world(self.level, &self.rays, active, &mut self.found);
             for place in bits(met) {
-                improve(&mut self.hits[at(place)], |nearest| geometry.offer_world(&self.found, place, nearest));
+                geometry.offer_world(&self.found, place, &mut self.hits[at(place)]);
             }
         }
         if upper_bundle && !self.meshes.is_empty() {
-            ask_from_here(&mut self.found, active, |place| Nearest(self.hits[at(place)]));
+            ask_from_here(&mut self.found, active, |place| self.hits[at(place)].limit());
             let mut met = 0;
             for mesh in &self.meshes {
                 met |= geometry.meet_placed_tile(self.level, *mesh, &self.rays, active, &mut self.found);
             }
             for place in bits(met) {
-                let offer = |nearest: &mut Nearest| geometry.offer_placed(&self.meshes, &self.found, place, nearest);
-                improve(&mut self.hits[at(place)], offer);
+                geometry.offer_placed(&self.meshes, &self.found, place, &mut self.hits[at(place)]);
             }
         }
     }
@@ -126,14 +129,7 @@ impl PixelHits {
             let (columns, rows) = (&xs[part % 2 * 4..][..4], &ys[part / 2 * 4..][..4]);
             let x: [f32; LANES] = std::array::from_fn(|k| columns[k % 4]);
             let y: [f32; LANES] = std::array::from_fn(|k| rows[k / 4]);
-            let ways = dispatch_wide!(self.level, simd => simd.vectorize(
-                #[inline(always)]
-                || {
-                    let [x, y] = [x, y].map(|places| f32x16::simd_from(simd, places));
-                    let ways = scene.camera.ray_lanes(simd, x, y);
-                    ways.map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()])
-                },
-            ));
+            let ways = ray_lanes(self.level, scene, x, y);
             for (to, from) in [&mut self.rays.o, &mut self.rays.d].into_iter().zip(ways) {
                 for axis in 0..3 {
                     to[axis][LANES * part..][..LANES].copy_from_slice(&from[axis]);
@@ -142,32 +138,26 @@ impl PixelHits {
         }
     }
 
-    /// The camera ray through a pixel of the last block, where a pixel has one.
+    /// The camera ray through a pixel, where a pixel has one.
     #[inline(always)]
-    pub fn ray(&self, i: u32, j: u32) -> Ray {
+    pub fn ray(&self, [i, j]: [u32; 2]) -> Ray {
         debug_assert_eq!(self.n, 1, "of several, each belongs to a block of its own");
-        let place = place(i, j);
+        let place = place(i - self.first[0], j - self.first[1]);
         Ray { o: self.rays.o(place), d: self.rays.d(place) }
     }
 
-    /// The hit of ray (`column`, `row`) of pixel (`i`, `j`), counted from the first pixel that was traced.
+    /// The hit of ray (`column`, `row`) of a pixel that was traced.
     #[inline(always)]
-    pub fn get(&self, i: u32, j: u32, column: u32, row: u32) -> Option<Hit> {
-        self.hits[((j * self.n + row) * self.across + i * self.n + column) as usize]
+    pub fn get(&self, [i, j]: [u32; 2], column: u32, row: u32) -> Option<Hit> {
+        let [i, j] = [i - self.first[0], j - self.first[1]];
+        self.hits[((j * self.n + row) * self.across + i * self.n + column) as usize].0
     }
 }
 
-/// Replaces a ray's nearest hit by a nearer one.
-fn improve(hit: &mut Option<Hit>, offer: impl FnOnce(&mut Nearest)) {
-    let mut nearest = Nearest(*hit);
-    offer(&mut nearest);
-    *hit = nearest.0;
-}
-
 /// Limits hits to the nearest known hit of each ray.
-fn ask_from_here(found: &mut TileHits, active: u64, nearest: impl Fn(usize) -> Nearest) {
+fn ask_from_here(found: &mut TileHits, active: u64, limit: impl Fn(usize) -> f32) {
     for place in bits(active) {
-        found.t[place] = nearest(place).limit();
+        found.t[place] = limit(place);
         found.surface[place] = u32::MAX;
         found.triangle[place] = u32::MAX;
     }
@@ -197,6 +187,17 @@ fn place(column: u32, row: u32) -> usize {
     ((row / 4 * 2 + column / 4) * 16 + row % 4 * 4 + column % 4) as usize
 }
 
+/// The origins and the ways of the camera rays through sixteen places on the film, axis by axis.
+fn ray_lanes(level: Level, scene: &Scene, x: [f32; LANES], y: [f32; LANES]) -> [[[f32; LANES]; 3]; 2] {
+    dispatch_wide!(level, simd => simd.vectorize(
+        #[inline(always)]
+        || {
+            let [x, y] = [x, y].map(|places| f32x16::simd_from(simd, places));
+            scene.camera.ray_lanes(simd, x, y).map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()])
+        },
+    ))
+}
+
 /// The camera rays of one pixel, row by row.
 pub(crate) struct PixelRays {
     level: Level,
@@ -221,14 +222,7 @@ impl PixelRays {
     pub fn of(&mut self, scene: &Scene, [i, j]: [u32; 2]) -> &[Ray] {
         let PixelRays { places, rays, .. } = self;
         for (places, rays) in places.iter().zip(rays.chunks_mut(LANES)) {
-            let [o, d] = dispatch_wide!(self.level, simd => simd.vectorize(
-                #[inline(always)]
-                || {
-                    let [x, y] = places.map(|places| f32x16::simd_from(simd, places));
-                    let ways = scene.camera.ray_lanes(simd, x + i as f32, y + j as f32);
-                    ways.map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()])
-                },
-            ));
+            let [o, d] = ray_lanes(self.level, scene, places[0].map(|x| x + i as f32), places[1].map(|y| y + j as f32));
             for (k, ray) in rays.iter_mut().enumerate() {
                 *ray = Ray { o: Vec3::new(o[0][k], o[1][k], o[2][k]), d: Vec3::new(d[0][k], d[1][k], d[2][k]) };
             }
@@ -304,16 +298,11 @@ mod tests {
                 let scene = parsed.compile(&NoAssets, &CompileOptions::default()).expect("is a scene").scene;
                 let mut hits = PixelHits::new(level, 1);
                 let mut met = 0;
-                for (y, x) in (0..37).step_by(8).flat_map(|y| (0..45).step_by(8).map(move |x| (y, x))) {
-                    let (w, h) = (8.min(45 - x), 8.min(37 - y));
-                    hits.trace(&scene, x, y, w, h);
-                    for (j, i) in (0..h).flat_map(|j| (0..w).map(move |i| (j, i))) {
-                        let one = scene.intersect_at(level, &hits.ray(i, j));
-                        assert_eq!(
-                            format!("{:?}", hits.get(i, j, 0, 0)),
-                            format!("{one:?}"),
-                            "{number} {x} {y} {i} {j}"
-                        );
+                for block in (Tile { x: 0, y: 0, width: 45, height: 37 }).parts(8, 1) {
+                    hits.trace(&scene, block);
+                    for pixel in block.pixels() {
+                        let one = scene.intersect_at(level, &hits.ray(pixel));
+                        assert_eq!(format!("{:?}", hits.get(pixel, 0, 0)), format!("{one:?}"), "{number} {pixel:?}");
                         met += u32::from(one.is_some());
                     }
                 }

@@ -6,7 +6,7 @@ use fearless_simd::Level;
 use super::centers::Center;
 use crate::camera::Camera;
 use crate::math::{DVec3, Ray, UNIT_ROUNDOFF};
-use crate::scene::{Hit, Scene};
+use crate::scene::Scene;
 
 /// Pixels to the right and down, and the visibility there: 1 visible, 0 occluded, -1 outside of what the camera images.
 pub(super) type Flow = [f32; 3];
@@ -14,20 +14,6 @@ pub(super) type Flow = [f32; 3];
 /// Error bound of the position of a point that is computed in one scene and found again in another, in units of the
 /// last place of 32 bits: the rounding of the point, of the ray to it, and of the surface there.
 const ROUNDINGS: u32 = 32;
-
-/// A point of a surface, moved to where it is in another scene.
-struct Carried<'a> {
-    there: &'a Scene,
-    level: Level,
-    of: Hit,
-    /// Its position there, and the normal of its front, of any length.
-    p: DVec3,
-    front: DVec3,
-    /// Whether the front was visible.
-    is_front: bool,
-    /// The error bound of `p`, without the part that grows with the distance to the camera.
-    error: f64,
-}
 
 /// The flow of the hit of a centre ray.
 pub(super) fn of_thing(center: &Center, there: &Scene, level: Level) -> Flow {
@@ -45,10 +31,9 @@ pub(super) fn of_thing(center: &Center, there: &Scene, level: Level) -> Flow {
     else {
         return nowhere();
     };
-    let error = center.error() + roundings(p.abs().max(moved.abs()).max_element());
-    let is_front = center.is_front();
-    let carried = Carried { there, level, of: center.hit, p: moved, front: turned, is_front, error };
-    flow(before, after, || depth > 0.0 && is_inside(there, after) && carried.is_seen(after))
+    flow(before, after, || {
+        depth > 0.0 && is_inside(there, after) && is_seen(center, there, level, moved, turned, after)
+    })
 }
 
 /// The flow of a centre ray without a hit: of its end, infinitely far away.
@@ -88,29 +73,28 @@ fn roundings(size: f64) -> f64 {
     size * f64::from(UNIT_ROUNDOFF) * f64::from(ROUNDINGS)
 }
 
-impl Carried<'_> {
-    /// Whether a camera ray through `pixel`, where it is, ends at it.
-    fn is_seen(&self, pixel: [f64; 2]) -> bool {
-        let ray = ray_at(&self.there.camera, pixel);
-        let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
-        let t = (self.p - o).dot(d) / d.length_squared();
-        let error = self.error + roundings(t.abs());
-        let is_front = self.front.dot(d) < 0.0;
-        let faces = is_front == self.is_front;
-        let Some(hit) = self.there.intersect_at(self.level, &ray) else {
-            // At an edge that the ray just misses; or it is the side that rays pass through
-            return faces;
-        };
-        let gap = t - hit.t;
-        if hit.surface == self.of.surface {
-            let met = Center::new(self.there, ray, Default::default(), hit);
-            // Along a slanting ray a little beside the point is far along the ray: what counts is how far the point is
-            // off the plane that was met. The far side of something round is met from the other side
-            let height = gap * met.normals()[0].as_dvec3().dot(d);
-            if height.abs() <= error + met.error() && met.is_front() == is_front {
-                return true;
-            }
+/// Whether a camera ray through `pixel` in another scene ends at the point of `center`, which is at `p` there. `front`
+/// is the normal of its front there, of any length.
+fn is_seen(center: &Center, there: &Scene, level: Level, p: DVec3, front: DVec3, pixel: [f64; 2]) -> bool {
+    let ray = ray_at(&there.camera, pixel);
+    let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
+    let t = (p - o).dot(d) / d.length_squared();
+    let error = center.error() + roundings(center.p().abs().max(p.abs()).max_element()) + roundings(t.abs());
+    let is_front = front.dot(d) < 0.0;
+    let faces = is_front == center.is_front();
+    let Some(hit) = there.intersect_at(level, &ray) else {
+        // At an edge that the ray just misses; or it is the side that rays pass through
+        return faces;
+    };
+    let gap = t - hit.t;
+    if hit.surface == center.hit.surface {
+        let met = Center::new(there, ray, Default::default(), hit);
+        // Along a slanting ray a little beside the point is far along the ray: what counts is how far the point is off
+        // the plane that was met. The far side of something round is met from the other side
+        let height = gap * met.normals()[0].as_dvec3().dot(d);
+        if height.abs() <= error + met.error() && met.is_front() == is_front {
+            return true;
         }
-        gap <= error && faces
     }
+    gap <= error && faces
 }

@@ -64,12 +64,12 @@ impl Passes {
                     let (terms, mut numbers): (Vec<Buffer>, Vec<Vec<f32>>) =
                         terms.filter_map(|term| Some((term, picture.floats(term)?.to_vec()))).unzip();
                     let rest = rest(picture.floats(Plane::Color.into()).unwrap_or_default(), &mut numbers);
-                    terms.iter().zip(&numbers).for_each(|(term, numbers)| picture.put(scene, *term, numbers));
+                    terms.into_iter().zip(numbers).for_each(|(term, numbers)| picture.put(scene, term, numbers));
                     rest
                 }
                 None => without(&[buffer.with_part(None)]).concat(),
             };
-            picture.put(scene, buffer, &numbers);
+            picture.put(scene, buffer, numbers);
         }
         picture.keep(asked);
         picture
@@ -203,16 +203,6 @@ fn closing(whole: f32, terms: &mut [f32]) -> f32 {
         terms[term] = given;
     }
     nearest
-}
-
-impl Film {
-    /// The numbers of a plane of floats.
-    fn floats(&self, of: Buffer) -> Option<&[f32]> {
-        match self.numbers(of)? {
-            PlaneNumbers::Floats(numbers) => Some(numbers),
-            PlaneNumbers::Wholes(_) => None,
-        }
-    }
 }
 
 #[cfg(test)]

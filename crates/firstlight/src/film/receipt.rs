@@ -81,9 +81,7 @@ impl Scene {
         }
         Receipt { entries: entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect() }
     }
-}
 
-impl Scene {
     /// The matrices from the world to the pixels of a camera:
     ///
     /// - `intrinsics`: K of a pinhole camera, row by row, in pixels, the middle of the first pixel at (0.5, 0.5), with

@@ -37,16 +37,14 @@ pub struct ReceiptSettings {
     motion_to: Option<MotionTo>,
     size: [u32; 2],
     antialiasing: u32,
-    aa_mode: AaMode,
     camera: String,
     /// `None` for transparent.
     background: Option<ColorDesc>,
     shadow_terminator: ShadowTerminator,
     /// Runs of lights in scene order with the same number of samples.
     light_samples: Vec<(usize, SamplesDesc)>,
-    crop: Option<Window>,
-    reference: bool,
-    visibility: VisibilityMode,
+    /// But for the buffers.
+    settings: RenderSettings,
 }
 
 /// What is wrong with a receipt.
@@ -147,14 +145,8 @@ impl ReceiptSettings {
         let color = |text: &str| numbers(text, ' ').map(|linear: [f64; 3]| ColorDesc::from(linear));
         let background = |text: &str| if text == TRANSPARENT { Some(None) } else { color(text).map(Some) };
         let view = from.optional("view", |text| numbers(text, ' ').map(|[around, above]| View::new(around, above)))?;
-        let framing = match view {
-            Some(view) => Some(Framing { view, margin: from.required("margin", number)? }),
-            None => None,
-        };
-        let model = match from.optional("up", UpAxis::from_name)? {
-            Some(up) => Some(ModelSettings { up, smooth_deg: from.optional("smooth_deg", number)?, points: false }),
-            None => None,
-        };
+        let framing = |view| Ok(Framing { view, margin: from.required("margin", number)? });
+        let model = |up| Ok(ModelSettings { up, smooth_deg: from.optional("smooth_deg", number)?, points: false });
         let crop =
             |text: &str| numbers(text, ',').map(|[x, y, width, height]: [u32; 4]| Window { x, y, width, height });
         let visibility = |text: &str| match text {
@@ -167,22 +159,25 @@ impl ReceiptSettings {
             version: from.required("version", text)?,
             scene_hash: from.required("scene_hash", text)?,
             time: from.optional("time", number)?.unwrap_or(0.0),
-            framing,
-            model,
+            framing: view.map(framing).transpose()?,
+            model: from.optional("up", UpAxis::from_name)?.map(model).transpose()?,
             tolerance: from.optional("tolerance", number)?,
             display: from.optional("display", number)?,
             buffers: from.optional("buffers", buffers)?.unwrap_or_else(|| vec![Plane::Color.into()]),
             motion_to: from.optional("motion_to", motion_to)?,
             size: [from.required("width", number)?, from.required("height", number)?],
             antialiasing: from.required("antialiasing", number)?,
-            aa_mode: from.required("aa_mode", AaMode::from_name)?,
             camera: from.required("camera", text)?,
             background: from.required("background", background)?,
             shadow_terminator: from.required("shadow_terminator", ShadowTerminator::from_name)?,
             light_samples: from.required("light_samples", light_samples)?,
-            crop: from.optional("crop", crop)?,
-            reference,
-            visibility,
+            settings: RenderSettings {
+                aa_mode: from.required("aa_mode", AaMode::from_name)?,
+                crop: from.optional("crop", crop)?,
+                reference,
+                visibility,
+                ..RenderSettings::default()
+            },
         })
     }
 
@@ -211,7 +206,7 @@ impl ReceiptSettings {
         render.motion_to = self.motion_to.clone();
         let said = self.light_samples.iter();
         let mut said = said.flat_map(|(count, samples)| std::iter::repeat_n(*samples, *count));
-        for light in LightDesc::in_scene_order_mut(&mut desc.lights) {
+        for light in LightDesc::in_scene_order(&mut desc.lights) {
             if let Some(samples) = said.next() {
                 light.set_samples(samples);
             }
@@ -220,14 +215,7 @@ impl ReceiptSettings {
 
     /// The settings that give the same film of the compiled scene.
     pub fn settings(&self, scene: &Scene) -> RenderSettings {
-        RenderSettings {
-            aa_mode: self.aa_mode,
-            crop: self.crop,
-            reference: self.reference,
-            visibility: self.visibility,
-            buffers: scene.buffers().to_vec(),
-            ..RenderSettings::default()
-        }
+        RenderSettings { buffers: scene.buffers().to_vec(), ..self.settings.clone() }
     }
 }
 
@@ -255,8 +243,11 @@ mod tests {
     #[test]
     fn every_entry_is_read_or_named() {
         let read = ReceiptSettings::read(&receipt(&LEAST)).unwrap();
-        assert_eq!((read.size, read.antialiasing, read.aa_mode), ([40, 30], 2, AaMode::Full));
-        assert_eq!((read.background, read.crop, read.tolerance), (Some(ColorDesc::linear(0.0, 0.25, 1.0)), None, None));
+        assert_eq!((read.size, read.antialiasing, read.settings.aa_mode), ([40, 30], 2, AaMode::Full));
+        assert_eq!(
+            (read.background, read.settings.crop, read.tolerance),
+            (Some(ColorDesc::linear(0.0, 0.25, 1.0)), None, None)
+        );
         let samples = [SamplesDesc::Exact, SamplesDesc::Count(16), SamplesDesc::Count(1)];
         assert_eq!(read.light_samples, samples.map(|samples| (1, samples)));
         assert_eq!(read.buffers, [Plane::Color.into()]);

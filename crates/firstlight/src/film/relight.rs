@@ -95,22 +95,16 @@ impl FiledLight {
     }
 }
 
-/// What the file holds, by the names of its buffers.
-struct FiledTerms<'a>(&'a StoredPlanes);
+/// What is wrong with a file of too little.
+fn lacking(fault: String) -> RelightError {
+    RelightError(format!("{fault}; render it with --buffers color,relight, to .exr or .npz"))
+}
 
-impl<'a> FiledTerms<'a> {
-    fn floats(&self, name: &str, channels: usize) -> Option<&'a [f32]> {
-        let plane = self.0.plane(name).filter(|plane| plane.channels.len() == channels)?;
-        match &plane.numbers {
-            PlaneVec::Floats(numbers) => Some(numbers),
-            PlaneVec::Wholes(_) => None,
-        }
-    }
-
-    fn required(&self, name: &str, channels: usize) -> Result<&'a [f32], RelightError> {
-        self.floats(name, channels).ok_or_else(|| {
-            RelightError(format!("it has no buffer {name}; render it with --buffers color,relight, to .exr or .npz"))
-        })
+/// The floats of a buffer of a file.
+fn floats<'a>(file: &'a StoredPlanes, name: &str, channels: usize) -> Result<&'a [f32], RelightError> {
+    match file.plane(name).filter(|plane| plane.channels.len() == channels).map(|plane| &plane.numbers) {
+        Some(PlaneVec::Floats(numbers)) => Ok(numbers),
+        Some(PlaneVec::Wholes(_)) | None => Err(lacking(format!("it has no buffer {name}"))),
     }
 }
 
@@ -125,32 +119,27 @@ impl<'a> FiledTerms<'a> {
 /// The file lacks something; there is no such light; a strength or a colour that cannot be; a light that sent nothing
 /// when the file was rendered.
 pub fn relight(file: &StoredPlanes, changes: &[(String, LightChange)]) -> Result<Relit, RelightError> {
-    let planes = FiledTerms(file);
-    let lacking = |what: &str| {
-        RelightError(format!(
-            "its receipt does not say {what}; render it with --buffers color,relight, to .exr or .npz"
-        ))
-    };
-    let said = file.receipt.get(LIGHTS).ok_or_else(|| lacking("what its lights are"))?;
+    let untold = |what: &str| lacking(format!("its receipt does not say {what}"));
+    let said = file.receipt.get(LIGHTS).ok_or_else(|| untold("what its lights are"))?;
     let lights: Option<Vec<FiledLight>> =
         serde_json::from_str::<Vec<Value>>(said).ok().and_then(|all| all.iter().map(FiledLight::read).collect());
-    let before = lights.ok_or_else(|| lacking("what its lights are in words that are known"))?;
+    let before = lights.ok_or_else(|| untold("what its lights are in words that are known"))?;
     let scales = changed(&before, changes)?;
     // Sum the terms in their order
     let [background, emission, ambient] = [Plane::Background, Plane::Emission, Plane::Ambient].map(Plane::name);
-    let (background, ambient) = (planes.required(background, 3)?, planes.required(ambient, 3)?);
-    let emission = emitted(&planes, &before, &scales, planes.required(emission, 3)?)?;
+    let (background, ambient) = (floats(file, background, 3)?, floats(file, ambient, 3)?);
+    let emission = emitted(file, &before, &scales, floats(file, emission, 3)?)?;
     let mut sums: Vec<f32> = background.iter().zip(&emission).zip(ambient).map(|((b, e), a)| b + e + a).collect();
     for (light, scale) in before.iter().zip(&scales) {
         let Rgb { r, g, b } = scale.rgb();
         for part in &light.sends {
-            let values = planes.required(part, 3)?;
+            let values = floats(file, part, 3)?;
             for (sum, value) in sums.as_chunks_mut::<3>().0.iter_mut().zip(values.as_chunks::<3>().0) {
                 *sum = [sum[0] + r * value[0], sum[1] + g * value[1], sum[2] + b * value[2]];
             }
         }
     }
-    let alpha = planes.required(Plane::Alpha.name(), 1)?;
+    let alpha = floats(file, Plane::Alpha.name(), 1)?;
     let pixels = sums.as_chunks::<3>().0.iter().zip(alpha).map(|(&[r, g, b], a)| [r, g, b, *a]).collect();
     let display = file.receipt.get(SCENE_DISPLAY).and_then(|text| text.parse().ok()).unwrap_or_default();
     let own = |key: &str| !(key == LIGHTS || key == SCENE_DISPLAY || key == "buffers" || key.starts_with("buffer."));
@@ -181,15 +170,15 @@ fn changed(lights: &[FiledLight], changes: &[(String, LightChange)]) -> Result<V
             LightChange::Strength(strength) => scale.strength = *strength,
             LightChange::Color(color) => scale.color = color.linear,
         }
+        let refused = |fault: String| Err(RelightError(format!("light {name}: its {fault}")));
         if !(0.0..=MAX_STRENGTH).contains(&scale.strength) {
-            let message = format!("light {name}: its strength would be {}, which is outside [0, 1e15]", scale.strength);
-            return Err(RelightError(message));
+            return refused(format!("strength would be {}, which is outside [0, 1e15]", scale.strength));
         }
         if let Some(channel) = scale.color.into_iter().find(|channel| !(0.0..).contains(channel)) {
-            return Err(RelightError(format!("light {name}: its colour would be {channel}, which is below 0 or none")));
+            return refused(format!("colour would be {channel}, which is below 0 or none"));
         }
         if !scale.exact().iter().all(|c| *c <= MAX_LIGHT) {
-            return Err(RelightError(format!("light {name}: its colour times its strength would pass 1e30")));
+            return refused("colour times its strength would pass 1e30".into());
         }
         let sent_nothing = |(before, after): (f64, f64)| before == 0.0 && after > 0.0;
         if lights[at].scale.exact().into_iter().zip(scale.exact()).any(sent_nothing) {
@@ -229,7 +218,7 @@ fn find(lights: &[FiledLight], name: &str) -> Result<usize, RelightError> {
 
 /// The emission of visible lights, recomputed if one that may be visible is changed.
 fn emitted(
-    planes: &FiledTerms,
+    file: &StoredPlanes,
     before: &[FiledLight],
     after: &[LightScale],
     emission: &[f32],
@@ -238,7 +227,7 @@ fn emitted(
     if !is_changed || emission.iter().all(|value| *value == 0.0) {
         return Ok(emission.to_vec());
     }
-    let said = planes.0.receipt.get("antialiasing").and_then(|number| number.parse::<u32>().ok());
+    let said = file.receipt.get("antialiasing").and_then(|number| number.parse::<u32>().ok());
     let rays = said.filter(|n| (1..=MAX_ANTIALIASING).contains(n)).map(|n| n * n).ok_or_else(|| {
         RelightError(format!(
             "its receipt does not say how many camera rays it has: antialiasing, 1 to {MAX_ANTIALIASING}"
@@ -247,7 +236,7 @@ fn emitted(
     let mut sums = vec![Emission::default(); emission.len() / 3];
     for (light, scale) in before.iter().zip(after) {
         let Some(seen) = &light.seen else { continue };
-        let shares = planes.required(seen, 1)?;
+        let shares = floats(file, seen, 1)?;
         if let Some(share) = shares.iter().find(|share| !(0.0..=1.0).contains(*share)) {
             return Err(RelightError(format!("a pixel of its buffer {seen} is {share}, which is no share: 0 to 1")));
         }
@@ -256,9 +245,5 @@ fn emitted(
             sum.add(radiance, (share * rays as f32).round() as u32);
         }
     }
-    let mean = |sum: Emission| {
-        let Rgb { r, g, b } = sum.mean(rays);
-        [r, g, b]
-    };
-    Ok(sums.into_iter().flat_map(mean).collect())
+    Ok(sums.into_iter().flat_map(|sum| sum.mean(rays).to_array()).collect())
 }

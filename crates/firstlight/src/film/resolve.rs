@@ -58,16 +58,14 @@ pub(crate) struct Emission([f64; 3]);
 impl Emission {
     /// Adds the radiance of a light that `rays` rays meet.
     pub fn add(&mut self, radiance: Rgb, rays: u32) {
-        let Rgb { r, g, b } = radiance;
-        for (sum, radiance) in self.0.iter_mut().zip([r, g, b]) {
+        for (sum, radiance) in self.0.iter_mut().zip(radiance.to_array()) {
             *sum += f64::from(radiance) * f64::from(rays);
         }
     }
 
     /// The mean over `rays` rays.
     pub fn mean(&self, rays: u32) -> Rgb {
-        let [r, g, b] = self.0.map(|sum| (sum / f64::from(rays)) as f32);
-        Rgb::new(r, g, b)
+        Rgb::from_array(self.0.map(|sum| (sum / f64::from(rays)) as f32))
     }
 }
 

@@ -1,59 +1,32 @@
-//! Tiles: the unit of work of a thread.
+//! Tiles: the windows of the film that threads take turns at, and the parts of tiles.
 
-use crate::image::Window;
-
-/// A rectangle of pixels, in coordinates of the film.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Tile {
-    pub x: u32,
-    pub y: u32,
-    pub width: u32,
-    pub height: u32,
-}
+pub(crate) use crate::image::Window as Tile;
 
 impl Tile {
-    /// Tiles of at most `size` x `size` pixels that cover `window`, each pixel once.
-    pub fn cover(window: Window, size: u32) -> Vec<Tile> {
-        let mut tiles = Vec::new();
-        for y in (0..window.height).step_by(size as usize) {
-            for x in (0..window.width).step_by(size as usize) {
-                let (width, height) = (size.min(window.width - x), size.min(window.height - y));
-                tiles.push(Tile { x: window.x + x, y: window.y + y, width, height });
-            }
-        }
-        tiles
-    }
-
-    /// The same in whole cells of a grid of the film: at the window's edges tiles are smaller, elsewhere as large as
-    /// `size`, rounded up to cells.
-    pub fn cover_cells(window: Window, size: u32, cell: u32) -> Vec<Tile> {
-        let size = size.next_multiple_of(cell) as u64;
-        let spans = |from: u32, length: u32| {
-            let end = from as u64 + length as u64;
-            let first = from as u64 / cell as u64 * cell as u64;
-            (0..).map(move |k| first + k * size).take_while(move |start| *start < end).map(move |start| {
-                let (a, b) = (start.max(from as u64), (start + size).min(end));
+    /// Tiles of whole cells of a grid of the film that cover this one, row by row: at its edges they are smaller,
+    /// elsewhere as large as `size`, rounded up to cells.
+    pub fn parts(self, size: u32, cell: u32) -> impl Iterator<Item = Tile> {
+        let size = u64::from(size.next_multiple_of(cell));
+        let spans = move |from: u32, length: u32| {
+            let (first, end) = (u64::from(from / cell * cell), u64::from(from) + u64::from(length));
+            (first..end).step_by(size as usize).map(move |start| {
+                let (a, b) = (start.max(u64::from(from)), (start + size).min(end));
                 (a as u32, (b - a) as u32)
             })
         };
-        let mut tiles = Vec::new();
-        for (y, height) in spans(window.y, window.height) {
-            tiles.extend(spans(window.x, window.width).map(|(x, width)| Tile { x, y, width, height }));
-        }
-        tiles
+        let rows = spans(self.y, self.height);
+        rows.flat_map(move |(y, height)| spans(self.x, self.width).map(move |(x, width)| Tile { x, y, width, height }))
+    }
+
+    /// Its pixels, row by row.
+    pub fn pixels(self) -> impl Iterator<Item = [u32; 2]> {
+        let columns = self.x..self.x + self.width;
+        (self.y..self.y + self.height).flat_map(move |y| columns.clone().map(move |x| [x, y]))
     }
 
     /// Whether it has this pixel.
     pub fn contains(&self, [i, j]: [u32; 2]) -> bool {
         (self.x..self.x + self.width).contains(&i) && (self.y..self.y + self.height).contains(&j)
-    }
-
-    /// The upper left corners of the cells of a grid of the film that the tile has a part of, row by row.
-    pub fn cells(self, side: u32) -> impl Iterator<Item = [u32; 2]> {
-        let starts =
-            move |from: u32, length: u32| (from / side..(from + length).div_ceil(side)).map(move |cell| cell * side);
-        let columns = starts(self.x, self.width);
-        starts(self.y, self.height).flat_map(move |y| columns.clone().map(move |x| [x, y]))
     }
 }
 
@@ -79,7 +52,7 @@ mod tests {
     #[test]
     fn tiles_are_spread_and_none_is_lost() {
         for (width, height) in [(1, 1), (8, 8), (16, 8), (24, 8), (40, 24), (100, 77), (1024, 768), (1000, 1000)] {
-            let tiles = Tile::cover(Window { x: 3, y: 2, width, height }, 8);
+            let tiles: Vec<Tile> = Tile { x: 3, y: 2, width, height }.parts(8, 1).collect();
             let spread = spread(&tiles);
             let sorted = |mut tiles: Vec<Tile>| {
                 tiles.sort_by_key(|t| (t.y, t.x));
@@ -98,15 +71,11 @@ mod tests {
 
     #[test]
     fn every_pixel_is_in_one_tile() {
-        let window = Window { x: 5, y: 3, width: 37, height: 20 };
-        let mut seen = vec![0; 37 * 20];
-        for t in Tile::cover(window, 8) {
-            for y in t.y..t.y + t.height {
-                for x in t.x..t.x + t.width {
-                    seen[((y - 3) * 37 + (x - 5)) as usize] += 1;
-                }
-            }
+        let window = Tile { x: 5, y: 3, width: 37, height: 20 };
+        for cell in [1, 32] {
+            let mut pixels: Vec<[u32; 2]> = window.parts(8, cell).flat_map(Tile::pixels).collect();
+            pixels.sort_by_key(|[x, y]| [*y, *x]);
+            assert!(pixels.into_iter().eq(window.pixels()));
         }
-        assert!(seen.iter().all(|n| *n == 1));
     }
 }

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::context::{CompileContext, show};
 use crate::describe::{ColorDesc, SamplesDesc};
-use crate::math::{DVec3, ErrorBound, LANES, Ray, Vec3, Vec3x16};
+use crate::math::{DMat3, DVec3, ErrorBound, LANES, Ray, Vec3, Vec3x16};
 use crate::parallel;
 use crate::shape::{Parallelogram, PlaneSide};
 
@@ -21,34 +21,24 @@ pub(crate) const MAX_SAMPLES: u32 = 1 << 20;
 /// How many points stand for a light that is `exact`, where it has to be sampled all the same.
 pub(crate) const REFERENCE_SAMPLES: u32 = 400;
 
-/// Declares the table of an area light: its name, its own fields, then those that all area lights have.
+/// Declares the table of an area light: its own fields, and those that all area lights have.
 macro_rules! area_table {
     (
         $(#[doc = $doc:literal])*
         pub struct $name:ident { $($own:tt)* }
     ) => {
-        $crate::describe::table! {
+        $crate::light::light_table! {
             $(#[doc = $doc])*
-            pub struct $name {
-                /// What reports call it.
-                pub name: Option<String> = None,
-                /// The group of lights that it belongs to, for buffers: `group:NAME`.
-                pub group: Option<String> = None,
-                $($own)*
-                /// Linear colour; channels of 0 or more.
-                pub color: $crate::describe::ColorDesc = $crate::describe::ColorDesc::WHITE,
-                /// Radiance (physical), or a plain factor (constant); 0 to 1e15.
-                pub strength: f64 = 1.0,
-                /// How light weakens on its way.
-                pub falloff: $crate::light::Falloff = $crate::light::Falloff::Physical,
+            pub struct $name { $($own)* }
+            /// Radiance (physical), or a plain factor (constant); 0 to 1e15.
+            strength {
                 /// The sides that emit; without it, `front` under `physical` and `both` under `constant`.
                 pub sides: Option<$crate::light::EmitSides> = None,
                 /// Whether the camera sees it, as its colour.
                 pub visible: bool = true,
                 /// Whether it stops the light of others.
                 pub blocks: bool = false,
-                /// Whether its light can be blocked.
-                pub shadows: bool = true,
+            } {
                 /// How many points of it are sampled, 1 to 1048576, or `"exact"`: it is integrated, not sampled.
                 /// Without it, `render.samples`.
                 pub samples: Option<$crate::describe::SamplesDesc> = None,
@@ -62,17 +52,9 @@ macro_rules! area_table {
         impl $name {
             /// What it says that every area light can say.
             pub(super) fn emitter(&self) -> $crate::light::area::AreaCommon {
+                let Self { color, strength, falloff, sides, visible, blocks, shadows, samples, set, seed, .. } = *self;
                 $crate::light::area::AreaCommon {
-                    color: self.color,
-                    strength: self.strength,
-                    falloff: self.falloff,
-                    sides: self.sides,
-                    visible: self.visible,
-                    blocks: self.blocks,
-                    shadows: self.shadows,
-                    samples: self.samples,
-                    set: self.set,
-                    seed: self.seed,
+                    color, strength, falloff, sides, visible, blocks, shadows, samples, set, seed,
                 }
             }
         }
@@ -111,6 +93,17 @@ pub(super) fn front(
 /// A light and what it faces nearer than this, in metres, are the same point.
 const MIN_DISTANCE: f64 = 1e-9;
 
+/// The largest sine of the angle that radii which a transform moved may be off a right one, and the largest relative
+/// difference of their lengths: others are those of an ellipse or an ellipsoid.
+const MAX_SKEW: f64 = 1e-6;
+
+/// Whether these are radii of something round, each at right angles to all others.
+pub(super) fn are_round(radii: &[DVec3]) -> bool {
+    let is_right = |a: &DVec3, b: &DVec3| a.dot(*b).abs() <= MAX_SKEW * a.length() * b.length();
+    let is_same = |a: &DVec3| (a.length() - radii[0].length()).abs() <= MAX_SKEW * radii[0].length();
+    radii.iter().enumerate().all(|(i, a)| is_same(a) && radii[..i].iter().all(|b| is_right(a, b)))
+}
+
 /// What every area light says beside its name and its shape.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AreaCommon {
@@ -126,9 +119,9 @@ pub(super) struct AreaCommon {
     pub seed: u32,
 }
 
-/// The products of the coordinates of a vector: xx, yy, zz, xy, yz, zx.
-pub(super) fn products(v: DVec3) -> [f64; 6] {
-    [v.x * v.x, v.y * v.y, v.z * v.z, v.x * v.y, v.y * v.z, v.z * v.x]
+/// The products of the coordinates of a vector.
+pub(super) fn products(v: DVec3) -> DMat3 {
+    DMat3::from_cols(v * v.x, v * v.y, v * v.z)
 }
 
 /// Checks the number of samples.
@@ -189,15 +182,7 @@ impl AreaCommon {
         if !exact && !cx.has_errors() {
             area.points();
         }
-        Light {
-            kind: LightKind::Area(area),
-            scale: scale.rgb(),
-            intensity: whole.rgb(),
-            radiance: whole.radiance(),
-            said: [scale, whole],
-            shadows: self.shadows,
-            exact,
-        }
+        Light::new(LightKind::Area(area), [scale, whole], self.shadows, exact)
     }
 }
 
@@ -218,24 +203,12 @@ pub struct Area {
     middle: Vec3,
     half: Vec3,
     /// Unit normal of the front, where all of it faces one way.
-    n: Option<Vec3>,
+    pub(super) n: Option<Vec3>,
     set: SampleSet,
     count: u32,
     seed: u32,
     /// The samples, computed at their first use.
     points: Arc<OnceLock<Points>>,
-}
-
-impl Area {
-    /// A point of it and the unit normal of its front, if it is flat and emits to that side alone.
-    pub(crate) fn front(&self) -> Option<(DVec3, DVec3)> {
-        match &self.shape {
-            _ if self.both_sides => None,
-            AreaShape::Rectangle(rectangle) => Some((rectangle.center, rectangle.n)),
-            AreaShape::Disk(disk) => Some((disk.center, disk.n)),
-            AreaShape::Sphere(_) => None,
-        }
-    }
 }
 
 /// The shape of an area light. In f64, as it was described.
@@ -264,21 +237,25 @@ impl AreaShape {
         }
     }
 
-    /// Unit normal of the front, where all of it faces one way.
-    pub(crate) fn flat_normal(&self) -> Option<Vec3> {
+    /// Its middle and the unit normal of the front, where all of it faces one way.
+    fn front(&self) -> Option<(DVec3, DVec3)> {
         match self {
-            AreaShape::Rectangle(rectangle) => Some(rectangle.n.as_vec3()),
-            AreaShape::Disk(disk) => Some(disk.n.as_vec3()),
+            AreaShape::Rectangle(rectangle) => Some((rectangle.center, rectangle.n)),
+            AreaShape::Disk(disk) => Some((disk.center, disk.n)),
             AreaShape::Sphere(_) => None,
         }
+    }
+
+    /// Unit normal of the front, where all of it faces one way.
+    pub(crate) fn flat_normal(&self) -> Option<Vec3> {
+        self.front().map(|(_, n)| n.as_vec3())
     }
 
     /// Unit normal of the front at a point of it.
     pub(crate) fn normal_at(&self, p: DVec3) -> Vec3 {
         match self {
-            AreaShape::Rectangle(rectangle) => rectangle.n.as_vec3(),
-            AreaShape::Disk(disk) => disk.n.as_vec3(),
             AreaShape::Sphere(sphere) => (p - sphere.center).normalize_or_zero().as_vec3(),
+            AreaShape::Rectangle(Rectangle { n, .. }) | AreaShape::Disk(DiskLight { n, .. }) => n.as_vec3(),
         }
     }
 
@@ -357,6 +334,11 @@ impl Area {
         self.count as usize
     }
 
+    /// A point of it and the unit normal of its front, if it is flat and emits to that side alone.
+    pub(crate) fn front(&self) -> Option<(DVec3, DVec3)> {
+        self.shape.front().filter(|_| !self.both_sides)
+    }
+
     /// The diagonal of the box around it.
     pub(crate) fn diagonal(&self) -> f32 {
         2.0 * self.half.length()
@@ -369,19 +351,16 @@ impl Area {
 
     /// The mean of the products of coordinates of its points about its center, as its light shows them, in square
     /// metres; and the largest distance of its points from its center, in metres.
-    pub(super) fn spread(&self) -> ([f64; 6], f64) {
-        let sum = |a: DVec3, b: DVec3, factor: f64| {
-            let (a, b) = (products(a), products(b));
-            std::array::from_fn(|i| (a[i] + b[i]) * factor)
-        };
+    pub(super) fn spread(&self) -> (DMat3, f64) {
         match &self.shape {
-            AreaShape::Rectangle(r) => (sum(r.e0, r.e1, 1.0 / 12.0), 0.5 * (r.e0.length() + r.e1.length())),
-            AreaShape::Disk(disk) => (sum(disk.a, disk.b, 0.25), disk.radius),
+            AreaShape::Rectangle(r) => {
+                ((products(r.e0) + products(r.e1)) * (1.0 / 12.0), 0.5 * (r.e0.length() + r.e1.length()))
+            }
+            AreaShape::Disk(disk) => ((products(disk.a) + products(disk.b)) * 0.25, disk.radius),
             // From outside its light is that of a point
-            AreaShape::Sphere(sphere) if self.physical => ([0.0; 6], sphere.radius),
+            AreaShape::Sphere(sphere) if self.physical => (DMat3::ZERO, sphere.radius),
             AreaShape::Sphere(sphere) => {
-                let third = sphere.radius * sphere.radius / 3.0;
-                ([third, third, third, 0.0, 0.0, 0.0], sphere.radius)
+                (DMat3::from_diagonal(DVec3::splat(sphere.radius * sphere.radius / 3.0)), sphere.radius)
             }
         }
     }
@@ -389,11 +368,6 @@ impl Area {
     /// About the largest weight of all of it from such a distance.
     pub(crate) fn most(&self, distance: f32) -> f32 {
         if self.physical { self.stands_for() / (distance * distance) } else { 1.0 }
-    }
-
-    /// Unit normal of the front, where all of it faces one way.
-    pub(crate) fn normal(&self) -> Option<Vec3> {
-        self.n
     }
 
     /// The sampled points.

@@ -59,7 +59,7 @@ pub(crate) struct ReceiverBounds {
 }
 
 /// Bounds of what a light of strength 1 contributes to the receivers.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct ContributionBounds {
     /// Upper bounds: before the cosine at the receiver, and with it.
     pub max_weight: f32,
@@ -83,26 +83,6 @@ const ROOM: f32 = 1.0 + 1e-4;
 const COS_ROOM: f32 = 1e-4;
 /// The largest upper bound: products of a few of them stay finite.
 pub(crate) const MAX_CONTRIBUTION: f32 = 1e30;
-
-impl ReceiverBounds {
-    /// Bounds of the lobe for light from the directions within `spread` of `d`, a unit vector.
-    fn highlight(&self, d: Vec3, spread: Arc) -> Highlight {
-        self.lobe.highlight(self.mirrors.angles_to(d, spread), || self.wo.angles_to(d, spread)[1])
-    }
-}
-
-impl ContributionBounds {
-    /// Those of a light that does not reach the receivers.
-    const ZERO: ContributionBounds = ContributionBounds {
-        max_weight: 0.0,
-        max_diffuse: 0.0,
-        highlight: Highlight { most: 0.0, slope: 0.0, curve: 0.0 },
-        min_diffuse: 0.0,
-        min_distance: 0.0,
-        is_smooth: true,
-        sin_half_angle: 0.0,
-    };
-}
 
 impl LightBounds {
     /// The bounds of one light, and its strength: the factor of its intensity at distance 1 along its normal.
@@ -153,7 +133,7 @@ impl LightBounds {
                     (false, _, true) => EmissionProfile::Constant,
                     _ => EmissionProfile::Other,
                 };
-                let normal = area.normal().filter(|_| !area.both_sides);
+                let normal = area.n.filter(|_| !area.both_sides);
                 let axes = normal.map_or(DirectionCone::SPHERE, DirectionCone::of);
                 (LightBounds { low, high, axes, ..at(profile, low, !area.physical) }, strength as f32)
             }
@@ -200,8 +180,10 @@ impl LightBounds {
         let off = Arc::between(d, normals.axis);
         let shift = spread.plus(normals.angle);
         let (max_cos, min_cos) = (off.minus(shift).cos + COS_ROOM, off.plus(shift).cos - COS_ROOM);
+        // Of a light that does not reach the receivers
+        let nothing = ContributionBounds { is_smooth: true, ..ContributionBounds::default() };
         if max_cos <= 0.0 {
-            return ContributionBounds::ZERO;
+            return nothing;
         }
         // The emission towards the receivers, at full strength 1
         let [min_angle, max_angle] = self.axes.angles_to(-d, spread);
@@ -227,7 +209,7 @@ impl LightBounds {
             EmissionProfile::Isotropic | EmissionProfile::Constant | EmissionProfile::Directional => {}
         }
         if max_emission == 0.0 {
-            return ContributionBounds::ZERO;
+            return nothing;
         }
         let min_distance = if is_directional {
             f32::INFINITY
@@ -242,10 +224,11 @@ impl LightBounds {
             (max_emission / square(min_distance).max(f32::MIN_POSITIVE), min_emission / square(max_distance))
         };
         let max_weight = (weight * ROOM).min(MAX_CONTRIBUTION);
+        let viewer_angle = || receivers.wo.angles_to(d, spread)[1];
         ContributionBounds {
             max_weight,
             max_diffuse: max_weight * max_cos.min(1.0),
-            highlight: receivers.highlight(d, spread),
+            highlight: receivers.lobe.highlight(receivers.mirrors.angles_to(d, spread), viewer_angle),
             min_diffuse: min_weight * min_cos.max(0.0),
             min_distance,
             is_smooth,

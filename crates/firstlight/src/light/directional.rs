@@ -1,13 +1,11 @@
 //! Directional lights.
 
-use super::{Falloff, Light, LightKind, scaled};
-use crate::color::Rgb;
+use super::{Light, LightKind, light_table, scaled};
 use crate::context::CompileContext;
-use crate::describe::{ColorDesc, table};
 use crate::math::{DVec3, Vec3};
 use crate::transform::TransformDesc;
 
-table! {
+light_table! {
     /// Light from infinitely far away, all of it in one direction: the sun on a clear day.
     ///
     /// Physical: E = color x strength x cos, strength in lux on a surface facing the light. Constant: color x strength.
@@ -18,23 +16,13 @@ table! {
     /// strength = 3
     /// ```
     pub struct DirectionalDesc {
-        /// What reports call it.
-        pub name: Option<String> = None,
-        /// The group of lights that it belongs to, for buffers: `group:NAME`.
-        pub group: Option<String> = None,
         /// The way the light travels, of any length above 1e-9.
         pub direction: [f64; 3],
         /// Where it is moved; it turns `direction`.
         pub transform: Option<Box<TransformDesc>> = None,
-        /// Linear colour; channels of 0 or more.
-        pub color: ColorDesc = ColorDesc::WHITE,
-        /// Lux (physical), or a plain factor (constant); 0 to 1e15.
-        pub strength: f64 = 1.0,
-        /// How light weakens on its way.
-        pub falloff: Falloff = Falloff::Physical,
-        /// Whether its light can be blocked.
-        pub shadows: bool = true,
     }
+    /// Lux (physical), or a plain factor (constant); 0 to 1e15.
+    strength
 }
 
 /// A directional light, compiled.
@@ -53,14 +41,7 @@ impl DirectionalDesc {
         }
         let to_light = -direction.normalize_or_zero();
         let scale = scaled(cx, self.color, self.strength, self.falloff.factor());
-        Light {
-            kind: LightKind::Directional(Directional { to_light: to_light.as_vec3() }),
-            scale: scale.rgb(),
-            intensity: scale.rgb(),
-            said: [scale; 2],
-            radiance: Rgb::BLACK,
-            shadows: self.shadows,
-            exact: false,
-        }
+        let kind = LightKind::Directional(Directional { to_light: to_light.as_vec3() });
+        Light::new(kind, [scale; 2], self.shadows, false)
     }
 }

@@ -1,7 +1,7 @@
 //! Disk lights.
 
 use super::Light;
-use super::area::{AreaShape, area_table, front};
+use super::area::{AreaShape, are_round, area_table, front};
 use crate::context::{CompileContext, show};
 use crate::describe::SamplesDesc;
 use crate::math::{Axes, DRay, DVec3, Ray, sin_cos_of_turns};
@@ -58,10 +58,6 @@ pub struct DiskLight {
     single_sided: bool,
 }
 
-/// A transform that leaves two perpendicular radii with a larger sine of their angle off the right one, or with lengths
-/// of a larger relative difference, makes an ellipse.
-const MAX_SKEW: f64 = 1e-6;
-
 impl DiskLightDesc {
     /// By its middle, the direction that its front faces, and its radius.
     pub fn with_normal(center: [f64; 3], normal: [f64; 3], radius: f64) -> Self {
@@ -96,16 +92,15 @@ impl DiskLightDesc {
             let before = cx.fault_count();
             let x = cx.moved_edge(world_from_object, "the radius", frame.x * radius);
             let y = world_from_object.transform_vector3(frame.y * radius);
-            let (long, wide) = (x.length(), y.length());
-            let round = x.dot(y).abs() <= MAX_SKEW * long * wide && (long - wide).abs() <= MAX_SKEW * long;
-            if cx.fault_count() == before && !round {
+            if cx.fault_count() == before && !are_round(&[x, y]) {
                 let (x, y) = (show(&x.to_array()), show(&y.to_array()));
                 let message = format!("it makes an ellipse of the disk: {x} and {y} of two of its radii");
                 cx.error("transform", message, Some("scale the disk alike along every direction in its plane"));
             }
             let n = x.cross(y).normalize_or(frame.z) * world_from_object.matrix3.determinant().signum();
+            radius = x.length();
             let x = x.normalize_or(frame.x);
-            (radius, frame) = (long, Axes { x, y: n.cross(x), z: n });
+            frame = Axes { x, y: n.cross(x), z: n };
         }
         let (emitter, center) = (self.emitter(), cx.local(center));
         let disk = DiskLight {
@@ -121,16 +116,6 @@ impl DiskLightDesc {
     }
 }
 
-/// The point of the unit disk that stands for a point of the square [-1, 1]^2.
-#[inline(always)]
-fn concentric([x, y]: [f64; 2]) -> [f64; 2] {
-    let is_flat = x.abs() > y.abs();
-    let (r, other) = if is_flat { (x, y) } else { (y, x) };
-    let part = if r == 0.0 { 0.0 } else { other / r };
-    let (sin, cos) = sin_cos_of_turns(0.125 * if is_flat { part } else { 2.0 - part });
-    [r * cos, r * sin]
-}
-
 impl DiskLight {
     /// The point that stands for `uv` of the unit square: squares around its middle become circles.
     ///
@@ -138,8 +123,11 @@ impl DiskLight {
     #[inline(always)]
     pub(super) fn point(&self, uv: [f64; 2]) -> DVec3 {
         let [x, y] = uv.map(|w| 2.0 * w - 1.0);
-        let [x, y] = concentric([x, y]);
-        self.center + self.a * x + self.b * y
+        let is_flat = x.abs() > y.abs();
+        let (r, other) = if is_flat { (x, y) } else { (y, x) };
+        let part = if r == 0.0 { 0.0 } else { other / r };
+        let (sin, cos) = sin_cos_of_turns(0.125 * if is_flat { part } else { 2.0 - part });
+        self.center + self.a * (r * cos) + self.b * (r * sin)
     }
 
     #[inline(always)]

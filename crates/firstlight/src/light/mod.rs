@@ -12,9 +12,11 @@ mod sphere;
 mod spot;
 mod tree;
 
+use std::borrow::Borrow;
+
 use crate::color::Rgb;
 use crate::context::CompileContext;
-use crate::describe::{ColorDesc, SamplesDesc, family, words};
+use crate::describe::{ColorDesc, Family, SamplesDesc, family, words};
 use crate::math::{ErrorBound, UNIT_ROUNDOFF, Vec3};
 use crate::transform::TransformDesc;
 
@@ -73,64 +75,92 @@ family! {
     }
 }
 
-/// Does the same with the table of any light.
-macro_rules! of_any {
-    ($light:expr, $table:ident => $do:expr) => {
+/// Declares the table of a light: its own fields between those that all lights have, the unit of its strength, and
+/// what only area lights say.
+macro_rules! light_table {
+    (
+        $(#[doc = $doc:literal])*
+        pub struct $name:ident { $($own:tt)* }
+        $(#[doc = $unit:literal])*
+        strength $({ $($emission:tt)* } { $($sampling:tt)* })?
+    ) => {
+        $crate::describe::table! {
+            $(#[doc = $doc])*
+            pub struct $name {
+                /// What reports call it.
+                pub name: Option<String> = None,
+                /// The group of lights that it belongs to, for buffers: `group:NAME`.
+                pub group: Option<String> = None,
+                $($own)*
+                /// Linear colour; channels of 0 or more.
+                pub color: $crate::describe::ColorDesc = $crate::describe::ColorDesc::WHITE,
+                $(#[doc = $unit])*
+                pub strength: f64 = 1.0,
+                /// How light weakens on its way.
+                pub falloff: $crate::light::Falloff = $crate::light::Falloff::Physical,
+                $($($emission)*)?
+                /// Whether its light can be blocked.
+                pub shadows: bool = true,
+                $($($sampling)*)?
+            }
+        }
+    };
+}
+
+use light_table;
+
+/// An expression of the table of a light, whatever its kind.
+macro_rules! of_table {
+    ($light:expr, $table:ident => $value:expr) => {
         match $light {
-            LightDesc::Point($table) => $do,
-            LightDesc::Directional($table) => $do,
-            LightDesc::Spot($table) => $do,
-            LightDesc::Rectangle($table) => $do,
-            LightDesc::Disk($table) => $do,
-            LightDesc::Sphere($table) => $do,
+            LightDesc::Point($table) => $value,
+            LightDesc::Directional($table) => $value,
+            LightDesc::Spot($table) => $value,
+            LightDesc::Rectangle($table) => $value,
+            LightDesc::Disk($table) => $value,
+            LightDesc::Sphere($table) => $value,
         }
     };
 }
 
 impl LightDesc {
-    /// The light that it describes; `samples` is the scene's default.
+    /// Lights in scene order: kind by kind, in each the order of the text.
+    pub(crate) fn in_scene_order<L: Borrow<LightDesc>>(lights: impl IntoIterator<Item = L>) -> impl Iterator<Item = L> {
+        let mut lights: Vec<L> = lights.into_iter().collect();
+        lights.sort_by_cached_key(|light| light.borrow().kind_index());
+        lights.into_iter()
+    }
+
+    /// The light; `samples` is the scene's default for area lights.
     pub(crate) fn compile(&self, cx: &mut CompileContext, samples: SamplesDesc) -> Light {
         match self {
-            LightDesc::Point(light) => light.compile(cx),
-            LightDesc::Directional(light) => light.compile(cx),
-            LightDesc::Spot(light) => light.compile(cx),
-            LightDesc::Rectangle(light) => light.compile(cx, samples),
-            LightDesc::Disk(light) => light.compile(cx, samples),
-            LightDesc::Sphere(light) => light.compile(cx, samples),
+            LightDesc::Point(point) => point.compile(cx),
+            LightDesc::Directional(directional) => directional.compile(cx),
+            LightDesc::Spot(spot) => spot.compile(cx),
+            LightDesc::Rectangle(rectangle) => rectangle.compile(cx, samples),
+            LightDesc::Disk(disk) => disk.compile(cx, samples),
+            LightDesc::Sphere(sphere) => sphere.compile(cx, samples),
         }
-    }
-
-    /// Lights in scene order: kind by kind, in each the order of the text.
-    pub(crate) fn in_scene_order(lights: &[LightDesc]) -> impl Iterator<Item = &LightDesc> {
-        Self::KINDS.iter().flat_map(|kind| lights.iter().filter(move |light| light.kind() == *kind))
-    }
-
-    /// The same, to be changed.
-    pub(crate) fn in_scene_order_mut(lights: &mut [LightDesc]) -> impl Iterator<Item = &mut LightDesc> {
-        let mut lights: Vec<&mut LightDesc> = lights.iter_mut().collect();
-        // Stable: in each kind the order of the text
-        lights.sort_by_key(|light| Self::KINDS.iter().position(|kind| *kind == light.kind()));
-        lights.into_iter()
     }
 
     /// Its name, if it has one.
     pub fn name(&self) -> Option<String> {
-        of_any!(self, light => light.name.clone())
+        of_table!(self, light => light.name.clone())
     }
 
     /// The group of lights that it belongs to, if any.
     pub fn group(&self) -> Option<&str> {
-        of_any!(self, light => light.group.as_deref())
+        of_table!(self, light => light.group.as_deref())
     }
 
     /// Its strength, and how it weakens on its way.
     pub fn strength(&self) -> (f64, Falloff) {
-        of_any!(self, light => (light.strength, light.falloff))
+        of_table!(self, light => (light.strength, light.falloff))
     }
 
     /// Where it is moved, if it says so.
-    pub fn transform(&self) -> Option<&TransformDesc> {
-        of_any!(self, light => light.transform.as_deref())
+    pub(crate) fn transform(&self) -> Option<&TransformDesc> {
+        of_table!(self, light => light.transform.as_deref())
     }
 
     /// How an area light is sampled: its own `samples`, if it says any, and how the points are laid out. `None` for a
@@ -194,8 +224,7 @@ impl LightScale {
 
     /// As renderers multiply with it.
     pub(crate) fn rgb(&self) -> Rgb {
-        let [r, g, b] = self.exact().map(|c| c as f32);
-        Rgb::new(r, g, b)
+        Rgb::from_array(self.exact().map(|c| c as f32))
     }
 
     /// What a camera sees of the light.
@@ -242,6 +271,14 @@ pub(crate) const MIN_DISTANCE2: f32 = 1e-30;
 impl Light {
     /// Its area, if it has one, which is sampled or integrated: what the camera can see of it, and what can stand in
     /// the way of others. Without one it comes from one point, or from one direction: one sample is all of it.
+    /// A light of that place and shape, of which `said` is how much light one sample is, and all of it.
+    fn new(kind: LightKind, said: [LightScale; 2], shadows: bool, exact: bool) -> Light {
+        let [scale, intensity] = said.map(|scale| scale.rgb());
+        Light { kind, scale, intensity, radiance: said[1].radiance(), said, shadows, exact }
+    }
+
+    /// Its shape in space, if it has one: what the camera can see of it, and what can stand in the way of others. It is
+    /// sampled or integrated; of a light from one point, or from one direction, one sample is all of it.
     #[inline(always)]
     pub fn area(&self) -> Option<&Area> {
         match &self.kind {
@@ -276,8 +313,7 @@ impl Light {
     pub fn towards(&self, k: usize, p: Vec3) -> Towards {
         let to = |q: Vec3| Towards { l: q - p, finite: true };
         match &self.kind {
-            LightKind::Point(point) => to(point.position),
-            LightKind::Spot(spot) => to(spot.position),
+            LightKind::Point(Point { position, .. }) | LightKind::Spot(Spot { position, .. }) => to(*position),
             LightKind::Area(area) => to(area.point(k)),
             LightKind::Directional(directional) => Towards { l: directional.to_light, finite: false },
         }
@@ -293,8 +329,9 @@ impl Light {
     pub fn floor(&self, p: Vec3, error: ErrorBound, n: Vec3) -> f32 {
         match &self.kind {
             LightKind::Directional(directional) => n.abs().dot(directional.to_light.abs()) * (4.0 * UNIT_ROUNDOFF),
-            LightKind::Point(point) => n.abs().dot(way_error(point.position, Vec3::ZERO, p, error)),
-            LightKind::Spot(spot) => n.abs().dot(way_error(spot.position, Vec3::ZERO, p, error)),
+            LightKind::Point(Point { position, .. }) | LightKind::Spot(Spot { position, .. }) => {
+                n.abs().dot(way_error(*position, Vec3::ZERO, p, error))
+            }
             LightKind::Area(area) => area.floor(p, error, n),
         }
     }
@@ -328,16 +365,6 @@ impl Light {
 pub(crate) fn way_error(middle: Vec3, half: Vec3, p: Vec3, error: ErrorBound) -> Vec3 {
     let (far, way) = (middle.abs() + half, (middle - p).abs() + half);
     error.0 + (far + way * 4.0) * UNIT_ROUNDOFF
-}
-
-/// A point of a light's description as the scene keeps it.
-fn moved_point(cx: &mut CompileContext, field: &str, p: [f64; 3], transform: Option<&TransformDesc>) -> Vec3 {
-    cx.point(field, p);
-    let world = match TransformDesc::compile_field(transform, cx) {
-        Some(world_from_object) => cx.moved_point(world_from_object, p.into()),
-        None => p.into(),
-    };
-    cx.local(world).as_vec3()
 }
 
 /// `color` x `strength`, checked; `factor` is what the kind of light makes of it.

@@ -1,13 +1,11 @@
 //! Point lights.
 
-use super::{Falloff, Light, LightKind, moved_point, scaled};
-use crate::color::Rgb;
+use super::{Falloff, Light, LightKind, light_table, scaled};
 use crate::context::CompileContext;
-use crate::describe::{ColorDesc, table};
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 use crate::transform::TransformDesc;
 
-table! {
+light_table! {
     /// Light from one point, the same in every direction.
     ///
     /// Physical: E = I cos / d^2, I = color x strength in candela. Constant: color x strength at any distance.
@@ -18,23 +16,13 @@ table! {
     /// strength = 10
     /// ```
     pub struct PointDesc {
-        /// What reports call it.
-        pub name: Option<String> = None,
-        /// The group of lights that it belongs to, for buffers: `group:NAME`.
-        pub group: Option<String> = None,
         /// In metres, world space.
         pub position: [f64; 3],
         /// Where it is moved; it moves `position`.
         pub transform: Option<Box<TransformDesc>> = None,
-        /// Linear colour; channels of 0 or more.
-        pub color: ColorDesc = ColorDesc::WHITE,
-        /// Candela (physical), or a plain factor (constant); 0 to 1e15.
-        pub strength: f64 = 1.0,
-        /// How light weakens on its way.
-        pub falloff: Falloff = Falloff::Physical,
-        /// Whether its light can be blocked.
-        pub shadows: bool = true,
     }
+    /// Candela (physical), or a plain factor (constant); 0 to 1e15.
+    strength
 }
 
 /// A point light, compiled.
@@ -48,17 +36,15 @@ pub struct Point {
 
 impl PointDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext) -> Light {
-        let position = moved_point(cx, "position", self.position, self.transform.as_deref());
-        let scale = scaled(cx, self.color, self.strength, self.falloff.factor());
-        Light {
-            kind: LightKind::Point(Point { position, physical: self.falloff == Falloff::Physical }),
-            scale: scale.rgb(),
-            intensity: scale.rgb(),
-            said: [scale; 2],
-            radiance: Rgb::BLACK,
-            shadows: self.shadows,
-            exact: false,
+        cx.point("position", self.position);
+        let mut position = DVec3::from(self.position);
+        if let Some(world_from_object) = TransformDesc::compile_field(self.transform.as_deref(), cx) {
+            position = cx.moved_point(world_from_object, position);
         }
+        let position = cx.local(position).as_vec3();
+        let scale = scaled(cx, self.color, self.strength, self.falloff.factor());
+        let kind = LightKind::Point(Point { position, physical: self.falloff == Falloff::Physical });
+        Light::new(kind, [scale; 2], self.shadows, false)
     }
 }
 

@@ -13,18 +13,15 @@ pub(crate) struct Points {
     pub(super) normals: Vec<PointBlock>,
 }
 
-/// Sixteen points, or normals. Where there is none, every coordinate is NaN: it is above no horizon and sends no light.
+/// Sixteen points, or normals, axis by axis. Where there is none, every coordinate is NaN: it is above no horizon and
+/// sends no light.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PointBlock {
-    x: [f32; LANES],
-    y: [f32; LANES],
-    z: [f32; LANES],
-}
+pub(crate) struct PointBlock(pub [[f32; LANES]; 3]);
 
 impl Points {
     /// How many there are.
     pub fn count(&self) -> usize {
-        let last = self.blocks.last().map_or(0, |block| block.x.iter().filter(|x| !x.is_nan()).count());
+        let last = self.blocks.last().map_or(0, |block| block.0[0].iter().filter(|x| !x.is_nan()).count());
         self.blocks.len().saturating_sub(1) * LANES + last
     }
 
@@ -37,31 +34,23 @@ impl Points {
 impl PointBlock {
     #[inline(always)]
     pub(super) fn of(point: impl Fn(usize) -> DVec3) -> PointBlock {
-        let mut block = PointBlock { x: [0.0; LANES], y: [0.0; LANES], z: [0.0; LANES] };
+        let mut block = PointBlock([[0.0; LANES]; 3]);
         for k in 0..LANES {
             let v = point(k).as_vec3();
-            (block.x[k], block.y[k], block.z[k]) = (v.x, v.y, v.z);
+            (block.0[0][k], block.0[1][k], block.0[2][k]) = (v.x, v.y, v.z);
         }
         block
     }
 
-    /// The coordinates of all of them, axis by axis.
-    #[inline(always)]
-    pub fn coordinates(&self) -> [[f32; LANES]; 3] {
-        [self.x, self.y, self.z]
-    }
-
     #[inline(always)]
     pub fn get(&self, lane: usize) -> Vec3 {
-        Vec3::new(self.x[lane], self.y[lane], self.z[lane])
+        let [x, y, z] = &self.0;
+        Vec3::new(x[lane], y[lane], z[lane])
     }
 
     #[inline(always)]
     pub fn lanes<S: Simd>(&self, simd: S) -> Vec3x16<S> {
-        Vec3x16 {
-            x: f32x16::simd_from(simd, self.x),
-            y: f32x16::simd_from(simd, self.y),
-            z: f32x16::simd_from(simd, self.z),
-        }
+        let [x, y, z] = self.0.map(|axis| f32x16::simd_from(simd, axis));
+        Vec3x16 { x, y, z }
     }
 }

@@ -1,7 +1,7 @@
 //! Sphere lights.
 
 use super::Light;
-use super::area::{AreaShape, area_table};
+use super::area::{AreaShape, are_round, area_table};
 use crate::context::{CompileContext, show};
 use crate::describe::SamplesDesc;
 use crate::math::{DVec3, sin_cos_of_turns};
@@ -42,10 +42,6 @@ pub struct SphereLight {
     pub(crate) shape: Sphere,
 }
 
-/// A transform whose axes are farther from right angles than this sine, or whose lengths have a larger relative
-/// difference, makes an ellipsoid.
-const MAX_SKEW: f64 = 1e-6;
-
 impl SphereLightDesc {
     /// `samples` is the scene's default.
     pub(crate) fn compile(&self, cx: &mut CompileContext, samples: SamplesDesc) -> Light {
@@ -56,17 +52,13 @@ impl SphereLightDesc {
             center = cx.moved_point(world_from_object, center);
             let before = cx.fault_count();
             let x = cx.moved_edge(world_from_object, "the radius", DVec3::X * radius);
-            let y = world_from_object.transform_vector3(DVec3::Y * radius);
-            let z = world_from_object.transform_vector3(DVec3::Z * radius);
-            let length = x.length();
-            let square = |v: DVec3, w: DVec3| v.dot(w).abs() <= MAX_SKEW * v.length() * w.length();
-            let same = |v: DVec3| (v.length() - length).abs() <= MAX_SKEW * length;
-            if cx.fault_count() == before && !(square(x, y) && square(y, z) && square(z, x) && same(y) && same(z)) {
+            let [y, z] = [DVec3::Y, DVec3::Z].map(|axis| world_from_object.transform_vector3(axis * radius));
+            if cx.fault_count() == before && !are_round(&[x, y, z]) {
                 let [x, y, z] = [x, y, z].map(|v| show(&v.to_array()));
                 let message = format!("it makes an ellipsoid of the sphere: {x}, {y} and {z} of three of its radii");
                 cx.error("transform", message, Some("scale the sphere alike along x, y and z"));
             }
-            radius = length;
+            radius = x.length();
         }
         let (emitter, center) = (self.emitter(), cx.local(center));
         let single_sided = !emitter.both_sides();

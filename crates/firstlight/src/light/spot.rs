@@ -2,14 +2,12 @@
 
 use pxfm::f_sin;
 
-use super::{Falloff, Light, LightKind, scaled};
-use crate::color::Rgb;
+use super::{Falloff, Light, LightKind, light_table, scaled};
 use crate::context::{CompileContext, show};
-use crate::describe::{ColorDesc, table};
 use crate::math::{DVec3, Vec3};
 use crate::transform::TransformDesc;
 
-table! {
+light_table! {
     /// Light from one point into a cone, with a soft rim between two angles.
     ///
     /// At the angle t from the axis: clamp((cos t - cos outer) / (cos inner - cos outer), 0, 1)^2, where `outer` and
@@ -24,10 +22,6 @@ table! {
     /// strength = 20
     /// ```
     pub struct SpotDesc {
-        /// What reports call it.
-        pub name: Option<String> = None,
-        /// The group of lights that it belongs to, for buffers: `group:NAME`.
-        pub group: Option<String> = None,
         /// In metres, world space.
         pub position: [f64; 3],
         /// The point at the middle of the cone; not `position` itself.
@@ -39,15 +33,9 @@ table! {
         /// Where the light begins to fade: a full angle in degrees, from 0 to `cone_deg`; without it, `cone_deg` itself
         /// and a hard rim.
         pub inner_cone_deg: Option<f64> = None,
-        /// Linear colour; channels of 0 or more.
-        pub color: ColorDesc = ColorDesc::WHITE,
-        /// Candela on the axis (physical), or a plain factor (constant); 0 to 1e15.
-        pub strength: f64 = 1.0,
-        /// How light weakens on its way.
-        pub falloff: Falloff = Falloff::Physical,
-        /// Whether its light can be blocked.
-        pub shadows: bool = true,
     }
+    /// Candela on the axis (physical), or a plain factor (constant); 0 to 1e15.
+    strength
 }
 
 /// A spot light, compiled.
@@ -75,11 +63,8 @@ impl SpotDesc {
         }
         let axis = to - from;
         if !(axis.length() >= 1e-9) {
-            let message = format!(
-                "{} is the light's position {}: the cone has no axis",
-                show(&to.to_array()),
-                show(&from.to_array())
-            );
+            let (to, from) = (show(&to.to_array()), show(&from.to_array()));
+            let message = format!("{to} is the light's position {from}: the cone has no axis");
             cx.error("look_at", message, Some("move one of them"));
         }
         let hint = "the cone is the full angle, not half";
@@ -100,21 +85,14 @@ impl SpotDesc {
         };
         let (outer, inner) = (one_minus_cos(self.cone_deg), one_minus_cos(inner));
         let scale = scaled(cx, self.color, self.strength, self.falloff.factor());
-        Light {
-            kind: LightKind::Spot(Spot {
-                position: cx.local(from).as_vec3(),
-                axis: axis.normalize_or_zero().as_vec3(),
-                outer: outer as f32,
-                inverse_fade: (1.0 / (outer - inner)) as f32,
-                physical: self.falloff == Falloff::Physical,
-            }),
-            scale: scale.rgb(),
-            intensity: scale.rgb(),
-            said: [scale; 2],
-            radiance: Rgb::BLACK,
-            shadows: self.shadows,
-            exact: false,
-        }
+        let kind = LightKind::Spot(Spot {
+            position: cx.local(from).as_vec3(),
+            axis: axis.normalize_or_zero().as_vec3(),
+            outer: outer as f32,
+            inverse_fade: (1.0 / (outer - inner)) as f32,
+            physical: self.falloff == Falloff::Physical,
+        });
+        Light::new(kind, [scale; 2], self.shadows, false)
     }
 }
 
@@ -127,14 +105,7 @@ impl Spot {
         let between = self.axis + l * inverse_distance;
         let inside = self.outer - 0.5 * between.dot(between);
         // A hard rim has an infinite slope: the product is infinite inside and no number on the rim itself
-        let fade = inside * self.inverse_fade;
-        let fade = if !(inside > 0.0) {
-            0.0
-        } else if fade < 1.0 {
-            fade
-        } else {
-            1.0
-        };
+        let fade = if inside > 0.0 { (inside * self.inverse_fade).min(1.0) } else { 0.0 };
         let cone = fade * fade;
         if self.physical { cone * (inverse_distance * inverse_distance) } else { cone }
     }

@@ -15,7 +15,7 @@ use super::samples::mix;
 use super::{Area, Light};
 use crate::color::Rgb;
 use crate::material::{Colors, Lobe, Moments, PerMoment};
-use crate::math::{DVec3, Vec3};
+use crate::math::{DMat3, DVec3, Mat3, Vec3};
 
 /// Up to so many lights are all evaluated at every point; a scene with more has a light tree.
 pub(crate) const FEW_LIGHTS: usize = 16;
@@ -43,8 +43,8 @@ pub(crate) struct LightNode {
     /// Whether all channels have the same `centroid` and `mean_normal`.
     is_gray: bool,
     /// For each channel, the mean of the products of coordinates about the centroid, in square metres, the lights' own
-    /// extent included: xx, yy, zz, xy, yz, zx.
-    covariance: [[f32; 6]; 3],
+    /// extent included.
+    covariance: [Mat3; 3],
     /// For each channel, the sum of power x distance^2 from the centroid, the lights' own extent included.
     second_moment: Rgb,
     /// The same of distance^3.
@@ -105,8 +105,7 @@ impl LightTree {
             // Split at the median along the longest axis; equal centers by index
             let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
             let (low, high) = lights.iter().fold(none, |(a, b), light| (a.min(light.center), b.max(light.center)));
-            let size = high - low;
-            let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
+            let axis = (high - low).max_position();
             let half = lights.len() / 2;
             lights.select_nth_unstable_by(half, |a, b| {
                 a.center[axis].total_cmp(&b.center[axis]).then(a.index.cmp(&b.index))
@@ -114,7 +113,7 @@ impl LightTree {
             let (left, right) = lights.split_at_mut(half);
             let children = [self.build(left), self.build(right)];
             let [left, right] = children.map(|child| &self.nodes[child as usize]);
-            let power = |node: &LightNode| channels(node.power).map(f64::from).iter().sum::<f64>();
+            let power = |node: &LightNode| node.power.to_array().map(f64::from).iter().sum::<f64>();
             let (share, all) = (power(left), power(left) + power(right));
             let is_left = uniform(self.nodes.len() as u64) * all < share;
             let representative = if is_left { left.representative } else { right.representative };
@@ -140,7 +139,7 @@ struct TreeLight {
     power: Rgb,
     center: Vec3,
     /// The mean of the products of coordinates of its own points about its center, in square metres.
-    covariance: [f64; 6],
+    covariance: DMat3,
     /// The largest distance of its points from its center, in metres.
     radius: f64,
     shadows: bool,
@@ -149,7 +148,7 @@ struct TreeLight {
 impl TreeLight {
     fn new(index: u32, light: &Light, class: u32) -> TreeLight {
         let (bounds, strength) = LightBounds::of(light);
-        let (covariance, radius) = light.area().map_or(([0.0; 6], 0.0), Area::spread);
+        let (covariance, radius) = light.area().map_or((DMat3::ZERO, 0.0), Area::spread);
         let kind = bounds.profile as u8 * 2 + u8::from(light.shadows);
         TreeLight {
             index,
@@ -164,20 +163,14 @@ impl TreeLight {
     }
 }
 
-/// The channels of a colour.
-fn channels(color: Rgb) -> [f32; 3] {
-    [color.r, color.g, color.b]
-}
-
 impl LightNode {
     fn new(bounds: LightBounds, contents: NodeContents, representative: u32, lights: &[TreeLight]) -> LightNode {
-        let rgb = |v: [f32; 3]| Rgb::new(v[0], v[1], v[2]);
         let (mut centroid, mut mean_normal) = ([lights[0].center; 3], [lights[0].bounds.axes.axis; 3]);
         let [mut power, mut second, mut third, mut normal] = [[0.0f32; 3]; 4];
-        let mut covariance = [[0.0f32; 6]; 3];
+        let mut covariance = [Mat3::ZERO; 3];
         for channel in 0..3 {
             // In f64: a hundred thousand lights far from the origin
-            let power_of = |light: &TreeLight| f64::from(channels(light.power)[channel]);
+            let power_of = |light: &TreeLight| f64::from(light.power.to_array()[channel]);
             let mut sum = 0.0f64;
             let (mut at, mut n) = (DVec3::ZERO, DVec3::ZERO);
             for light in lights {
@@ -191,19 +184,17 @@ impl LightNode {
             }
             (centroid[channel], mean_normal[channel]) = ((at / sum).as_vec3(), (n / sum).as_vec3());
             power[channel] = sum as f32;
-            let (mut two, mut three, mut c, mut moments) = (0.0f64, 0.0f64, 0.0f64, [0.0f64; 6]);
+            let (mut two, mut three, mut c, mut moments) = (0.0f64, 0.0f64, 0.0f64, DMat3::ZERO);
             for light in lights {
                 let p = power_of(light);
                 let v = (light.center - centroid[channel]).as_dvec3();
-                for (moment, (own, extent)) in moments.iter_mut().zip(products(v).into_iter().zip(light.covariance)) {
-                    *moment += p * (own + extent);
-                }
+                moments += (products(v) + light.covariance) * p;
                 let far = v.length() + light.radius;
                 two += p * far * far;
                 three += p * far * far * far;
                 c += p * far * f64::from((light.bounds.axes.axis - mean_normal[channel]).length());
             }
-            covariance[channel] = moments.map(|v| (v / sum) as f32);
+            covariance[channel] = (moments / sum).as_mat3();
             // Positions are rounded
             let rounding = if lights.len() > 1 { f64::from(centroid[channel].abs().max_element() * 1e-6) } else { 0.0 };
             second[channel] = (two * 1.001 + sum * rounding * rounding) as f32;
@@ -219,14 +210,14 @@ impl LightNode {
             bounds,
             contents,
             count: lights.len() as u32,
-            power: rgb(power),
+            power: Rgb::from_array(power),
             centroid,
             mean_normal,
             is_gray: power[0] > 0.0 && (1..3).all(|i| power[i] == 0.0 || is_same(i)),
             covariance,
-            second_moment: rgb(second),
-            third_moment: rgb(third),
-            normal_moment: rgb(normal),
+            second_moment: Rgb::from_array(second),
+            third_moment: Rgb::from_array(third),
+            normal_moment: Rgb::from_array(normal),
             shadows: lights.iter().all(|light| light.shadows),
             representative,
         }
@@ -307,11 +298,8 @@ impl LightNode {
         let d = l * one;
         let (cos, normal) = (ns.dot(d), self.mean_normal[channel]);
         // The second derivatives, contracted with the covariance
-        let [xx, yy, zz, xy, yz, zx] = self.covariance[channel];
-        let times = |v: Vec3| {
-            Vec3::new(xx * v.x + xy * v.y + zx * v.z, xy * v.x + yy * v.y + yz * v.z, zx * v.x + yz * v.y + zz * v.z)
-        };
-        let (along, trace) = (times(d), xx + yy + zz);
+        let covariance = &self.covariance[channel];
+        let (along, trace) = (*covariance * d, covariance.diagonal().element_sum());
         let (across, deep) = (ns.dot(along), d.dot(along));
         let two = one * one;
         let (weight, diffuse) = match self.bounds.profile {
@@ -320,7 +308,7 @@ impl LightNode {
             // cos cos' / d^2
             EmissionProfile::Cosine => {
                 let out = -normal.dot(d);
-                let (across_out, both) = (-normal.dot(along), -ns.dot(times(normal)));
+                let (across_out, both) = (-normal.dot(along), -ns.dot(*covariance * normal));
                 let second = both - 4.0 * (cos * across_out + out * across) + cos * out * (12.0 * deep - 2.0 * trace);
                 (out.max(0.0) * two, (cos * out + two * second) * two)
             }

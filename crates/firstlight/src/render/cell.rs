@@ -171,12 +171,11 @@ impl<'a> Cells<'a> {
 
     /// Renders one tile. It calls `go_on` between the stations of a cell, and stops where that breaks.
     pub fn render(&mut self, film: &mut FilmTile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<(), Counts> {
-        let tile = &{ film.tile };
         let mut counts = Counts::default();
-        for corner in tile.cells(CELL) {
+        for part in film.tile.parts(CELL, CELL) {
             go_on()?;
-            self.cell(corner, &mut counts, go_on)?;
-            self.deliver(tile, film, &mut counts);
+            self.cell([part.x, part.y].map(|at| at / CELL * CELL), &mut counts, go_on)?;
+            self.deliver(part, film, &mut counts);
         }
         ControlFlow::Continue(counts)
     }
@@ -619,14 +618,12 @@ impl<'a> Cells<'a> {
     }
 
     /// Hands over the part of the cell that is in the tile.
-    fn deliver(&mut self, tile: &Tile, film: &mut FilmTile, counts: &mut Counts) {
+    fn deliver(&mut self, part: Tile, film: &mut FilmTile, counts: &mut Counts) {
         let rays = (self.scene.antialiasing * self.scene.antialiasing) as u64;
-        let [left, top] = self.corner;
-        let columns = left.max(tile.x)..(left + CELL).min(tile.x + tile.width);
-        for j in top.max(tile.y)..(top + CELL).min(tile.y + tile.height) {
-            let row = self.index([columns.start, j])..self.index([columns.start, j]) + columns.len();
-            counts.camera_rays += rays * columns.len() as u64;
-            film.set_row(columns.start - tile.x, j - tile.y, &self.sums, row);
+        for y in part.y..part.y + part.height {
+            let first = self.index([part.x, y]);
+            counts.camera_rays += rays * u64::from(part.width);
+            film.set_row([part.x, y], &self.sums, first..first + part.width as usize);
         }
     }
 }

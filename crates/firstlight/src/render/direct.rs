@@ -209,7 +209,8 @@ impl<'a> DirectLighting<'a> {
     /// Whether the visibility of light `index` is to be found for all rays of a block of pixels together: not of area
     /// lights that are sampled at fixed points.
     pub fn is_classified_by_blocks(&self, index: usize) -> bool {
-        self.is_integrated(index) || self.scene.lights[index].area().is_none()
+        let light = &self.scene.lights[index];
+        light.area().is_none() || light.is_integrated()
     }
 
     /// In display steps: how far one light may be wrong at a point that represents such a share of a pixel, where the

@@ -205,10 +205,8 @@ impl Lighting for Lanes {
 
     fn gather(&mut self, scene: &Scene, index: usize, point: &ShadingPoint, counts: &mut Counts) -> LobeSums {
         let light = &scene.lights[index];
-        let Some(area) = light.area() else {
-            // A single sample fills no lanes
-            return Plain.gather(scene, index, point, counts);
-        };
+        // A single sample fills no lanes
+        let Some(area) = light.area() else { return Plain.gather(scene, index, point, counts) };
         let id = LightId(index as u32);
         let BetweenShapes { spheres, flats, disks } = &mut self.between;
         let spheres = if self.sphere_opacities.iter().all(|opacity| *opacity == Opacity::Opaque) {

@@ -117,11 +117,7 @@ fn expose(
     // Where every light is sampled at every ray, the bits are those of the plain renderer
     let is_sampled = lights.integrated == 0;
     let every_ray = renderer.samples_all() || renderer == Renderer::Full && is_sampled;
-    let tiles = if every_ray {
-        Tile::cover(window, settings.tile_size)
-    } else {
-        Tile::cover_cells(window, settings.tile_size, CELL)
-    };
+    let tiles: Vec<Tile> = window.parts(settings.tile_size, if every_ray { 1 } else { CELL }).collect();
     let tiles = tile::spread(&tiles);
     let all = window.width as u64 * window.height as u64;
     let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
@@ -139,7 +135,7 @@ fn expose(
             }
             if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let mut film_tile = FilmTile::new(tile, planes);
+        let mut film_tile = FilmTile::new(*tile, planes);
         let film = &mut film_tile;
         let token = level.token();
         let center_rays = if of_centers { centers::fill(scene, token, film) } else { 0 };
@@ -218,31 +214,26 @@ fn render_tile(
     mut hits: Option<PixelHits>,
     go_on: &impl Fn() -> ControlFlow<()>,
 ) -> ControlFlow<(), Counts> {
-    let tile = film.tile;
     let mut counts = Counts::default();
     let mut pixel = PixelSum::new(scene);
     let mut sums = TermSums::new(scene, 1, &film.planes());
     let rays = (scene.antialiasing * scene.antialiasing) as f32;
     let side = hits.as_ref().map_or(1, PixelHits::side);
-    for top in (0..tile.height).step_by(side as usize) {
-        for left in (0..tile.width).step_by(side as usize) {
-            let (w, h) = ((tile.width - left).min(side), (tile.height - top).min(side));
-            if let Some(hits) = &mut hits {
-                hits.trace(scene, tile.x + left, tile.y + top, w, h);
-            }
-            for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
-                let hit = |column: u32, row: u32, ray: &Ray| match &hits {
-                    Some(hits) => hits.get(x, y, column, row),
-                    None => scene.intersect_local(ray),
-                };
-                pixel.clear();
-                let at = [tile.x + left + x, tile.y + top + y];
-                let before = counts.work();
-                pixel.sample(scene, at, lighting, hit, &mut counts, go_on)?;
-                pixel.resolve(scene, 0, &mut sums);
-                sums.work[0] = rays + counts.work() - before;
-                film.set_row(left + x, top + y, &sums, 0..1);
-            }
+    for block in film.tile.parts(side, 1) {
+        if let Some(hits) = &mut hits {
+            hits.trace(scene, block);
+        }
+        for at in block.pixels() {
+            let hit = |column: u32, row: u32, ray: &Ray| match &hits {
+                Some(hits) => hits.get(at, column, row),
+                None => scene.intersect_local(ray),
+            };
+            pixel.clear();
+            let before = counts.work();
+            pixel.sample(scene, at, lighting, hit, &mut counts, go_on)?;
+            pixel.resolve(scene, 0, &mut sums);
+            sums.work[0] = rays + counts.work() - before;
+            film.set_row(at, &sums, 0..1);
         }
     }
     ControlFlow::Continue(counts)

@@ -14,6 +14,7 @@ use super::{Counts, QUESTION_EVERY};
 use crate::film::FilmTile;
 use crate::film::hits::{PixelHits, camera_ray};
 use crate::film::resolve::TermSums;
+use crate::film::tile::Tile;
 use crate::ids::LightId;
 use crate::material::{Moments, ShadingPoint};
 use crate::scene::Scene;
@@ -51,54 +52,47 @@ impl<'a> Shafts<'a> {
 
     /// Renders one tile.
     pub fn render(&mut self, film: &mut FilmTile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<(), Counts> {
-        let tile = &{ film.tile };
         let mut counts = Counts::default();
         let side = self.hits.side();
         let rays = (self.scene.antialiasing * self.scene.antialiasing) as f32;
         let mut pixels: Vec<(PixelSum, usize)> = (0..side * side).map(|_| (PixelSum::new(self.scene), 0)).collect();
         let mut sums = TermSums::new(self.scene, 1, &film.planes());
-        for top in (0..tile.height).step_by(side as usize) {
-            for left in (0..tile.width).step_by(side as usize) {
-                let (w, h) = ((tile.width - left).min(side), (tile.height - top).min(side));
-                let pixels = &mut pixels[..(w * h) as usize];
-                let before = counts.work();
-                self.block([tile.x + left, tile.y + top], [w, h], pixels, &mut counts, go_on)?;
-                // What is settled for all points of the block together is shared
-                let work = rays + (counts.work() - before) / pixels.len() as f32;
-                for (i, (pixel, _)) in pixels.iter().enumerate() {
-                    let (x, y) = (i as u32 % w, i as u32 / w);
-                    pixel.resolve(self.scene, 0, &mut sums);
-                    sums.work[0] = work;
-                    film.set_row(left + x, top + y, &sums, 0..1);
-                }
+        for block in film.tile.parts(side, 1) {
+            let pixels = &mut pixels[..(block.width * block.height) as usize];
+            let before = counts.work();
+            self.block(block, pixels, &mut counts, go_on)?;
+            // What is settled for all points of the block together is shared
+            let work = rays + (counts.work() - before) / pixels.len() as f32;
+            for (at, (pixel, _)) in block.pixels().zip(pixels) {
+                pixel.resolve(self.scene, 0, &mut sums);
+                sums.work[0] = work;
+                film.set_row(at, &sums, 0..1);
             }
         }
         ControlFlow::Continue(counts)
     }
 
-    /// Renders the pixels from (`i`, `j`), row by row. Each goes with the number of points of those up to it.
+    /// Renders the pixels of a block, row by row. Each goes with the number of points of those up to it.
     fn block(
         &mut self,
-        [i, j]: [u32; 2],
-        [w, h]: [u32; 2],
+        block: Tile,
         pixels: &mut [(PixelSum, usize)],
         counts: &mut Counts,
         go_on: &impl Fn() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let scene = self.scene;
         let n = scene.antialiasing;
-        self.hits.trace(scene, i, j, w, h);
+        self.hits.trace(scene, block);
         self.points.clear();
         self.surfaces.clear();
-        for (place, (pixel, end)) in pixels.iter_mut().enumerate() {
-            let (x, y) = (place as u32 % w, place as u32 / w);
+        for ([i, j], (pixel, end)) in block.pixels().zip(&mut *pixels) {
             pixel.clear();
             for row in 0..n {
                 for column in 0..n {
                     counts.camera_rays += 1;
                     // Found anew: to keep a ray costs more than to find it
-                    let (ray, differential) = camera_ray(scene, (i + x) * n + column, (j + y) * n + row);
-                    let hit = self.hits.get(x, y, column, row);
+                    let (ray, differential) = camera_ray(scene, i * n + column, j * n + row);
+                    let hit = self.hits.get([i, j], column, row);
                     if let Some(point) = pixel.see(scene, scene.see(&ray, hit, &differential)) {
                         self.points.push(Viewpoint::of(&point));
                         self.surfaces.push(point);

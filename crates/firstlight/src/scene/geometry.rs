@@ -416,19 +416,6 @@ impl Geometry {
         self.stops(self.surfaces[surface.index()].opacity(), light)
     }
 
-    /// Whether a triangle of a mesh of that opacity, whose surfaces start at `first`, stands in the way of a light.
-    #[inline(always)]
-    pub fn triangle_casts(
-        &self,
-        mesh: &Mesh,
-        first: SurfaceId,
-        opacity: Opacity,
-        triangle: u32,
-        light: LightId,
-    ) -> bool {
-        opacity == Opacity::Opaque || self.casts(SurfaceId(first.0 + mesh.part(triangle).surface), light)
-    }
-
     /// One of the things that have no end: a plane, where it is placed.
     #[inline(always)]
     pub fn plane(&self, index: u32) -> (&Placed, &UnboundedPlane) {

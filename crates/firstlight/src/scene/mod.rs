@@ -58,7 +58,7 @@ pub(crate) use links::LinkId;
 use motion::Motion;
 pub(crate) use occluders::{Listed, ListedOccluders, Opacity};
 use seen_lights::SeenLights;
-pub(crate) use shadow_rays::ShadowRays;
+pub(crate) use shadow_rays::{MeshNumber, ShadowMesh, ShadowRays};
 pub(crate) use trees::FewFacets;
 
 /// A scene, ready to be rendered: flat lists and ids. Between here and the image nothing can fail.

@@ -7,6 +7,24 @@ use super::parallelogram::ParallelogramShadow;
 use super::sphere::SphereShadow;
 use crate::math::{UNIT_ROUNDOFF, Vec3};
 
+/// A light relative to one point: the vectors `l` + u `axes[0]` + v `axes[1]` + w `axes[2]` from the point to its box.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightSeen {
+    pub l: Vec3,
+    pub axes: [Vec3; 3],
+    /// An upper bound of the largest coordinate of any of the vectors.
+    pub longest: f32,
+    /// A lower bound of the largest coordinate of each of the vectors.
+    pub shortest: f32,
+    pub finite: bool,
+    /// The unit normal of a flat light; 0 for all others.
+    pub plane: Vec3,
+    /// The axes along which projections of occluders are bounded; those of a sphere face the point.
+    pub frame: [Vec3; 3],
+    /// The distance of the center of a sphere, in radii.
+    pub radii: Option<f32>,
+}
+
 /// How much of a light is hidden.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cover {
@@ -25,6 +43,23 @@ const ROOM: [f32; 2] = [4e-4, 1e-5];
 
 /// By how much a product of vectors is wrong, at most, in that of their lengths.
 const DOT: f32 = 16.0 * UNIT_ROUNDOFF;
+
+impl LightSeen {
+    #[inline(always)]
+    pub fn new(l: Vec3, axes: [Vec3; 3], finite: bool) -> Self {
+        let reach = axes[0].abs() + axes[1].abs() + axes[2].abs();
+        let longest = (l.abs() + reach).max_element() * (1.0 + 4.0 * f32::EPSILON);
+        let shortest = ((l.abs() - reach).max_element() - longest * (4.0 * f32::EPSILON)).max(0.0);
+        LightSeen { l, axes, longest, shortest, finite, plane: Vec3::ZERO, frame: axes, radii: None }
+    }
+
+    /// The range of f.w over the vectors w to the light, without rounding: its center and half its length.
+    #[inline(always)]
+    pub fn range(&self, f: Vec3) -> (f32, f32) {
+        let [a, b, c] = self.axes;
+        (f.dot(self.l), f.dot(a).abs() + f.dot(b).abs() + f.dot(c).abs())
+    }
+}
 
 /// The least of m.w for the ways of the hull, and the way to it.
 #[inline(always)]
@@ -46,8 +81,9 @@ fn corners(l: Vec3, axes: &[Vec3; 3]) -> impl Iterator<Item = Vec3> {
 }
 
 impl SphereShadow {
-    /// How much of a light it hides; `longest` is the largest coordinate of any way.
-    pub fn covers(&self, l: Vec3, axes: &[Vec3; 3], longest: f32, finite: bool) -> Cover {
+    /// How much of a light it hides.
+    pub fn covers(&self, light: &LightSeen) -> Cover {
+        let LightSeen { l, ref axes, longest, finite, .. } = *light;
         let Some((f, r)) = self.outside() else { return Cover::Some };
         // No way is longer than the sum of its coordinates
         let (distance, reach) = (f.length(), longest * 3.0);
@@ -107,12 +143,12 @@ impl SphereShadow {
 }
 
 impl ParallelogramShadow {
-    /// How much of a light it hides; `longest` is the largest coordinate of any way.
-    pub fn covers(&self, l: Vec3, axes: &[Vec3; 3], longest: f32, finite: bool) -> Cover {
+    /// How much of a light it hides.
+    pub fn covers(&self, light: &LightSeen) -> Cover {
         let mut all = true;
-        for (f, least, wrong) in self.bounds(longest, finite) {
-            let middle = f.dot(l) - least;
-            let reach = f.dot(axes[0]).abs() + f.dot(axes[1]).abs() + f.dot(axes[2]).abs();
+        for (f, least, wrong) in self.bounds(light.longest, light.finite) {
+            let (middle, reach) = light.range(f);
+            let middle = middle - least;
             if middle + reach < -wrong {
                 return Cover::Nothing;
             }
@@ -123,8 +159,9 @@ impl ParallelogramShadow {
 }
 
 impl DiskShadow {
-    /// How much of a light it hides; `longest` is the largest coordinate of any way.
-    pub fn covers(&self, l: Vec3, axes: &[Vec3; 3], longest: f32, finite: bool) -> Cover {
+    /// How much of a light it hides.
+    pub fn covers(&self, light: &LightSeen) -> Cover {
+        let LightSeen { l, ref axes, longest, finite, .. } = *light;
         let Some(DiskBounds { n, x, y, height, room, wrong }) = self.bounds(longest) else { return Cover::Nothing };
         // Beyond these its squares may leave the range of numbers
         if !(longest > 1e-9 && longest < 1e12 && wrong < 1e12) {
@@ -132,8 +169,8 @@ impl DiskShadow {
         }
         // Downwards -n.l has to come above the height, and where it does x^2 + y^2 below its square
         let range = |f: Vec3| {
-            let reach = f.dot(axes[0]).abs() + f.dot(axes[1]).abs() + f.dot(axes[2]).abs();
-            (f.dot(l) - reach, f.dot(l) + reach)
+            let (middle, reach) = light.range(f);
+            (middle - reach, middle + reach)
         };
         let (least, most) = range(-n);
         let ahead = if finite { height } else { 0.0 };

@@ -45,7 +45,7 @@ pub use torus::TorusDesc;
 
 pub(crate) use cache::{MeshFiles, key_of};
 pub(crate) use common::Common;
-pub(crate) use cover::Cover;
+pub(crate) use cover::{Cover, LightSeen};
 pub(crate) use disk::{Disk, DiskShadow};
 pub(crate) use mesh::{JoinedPart, Mesh, MeshBuilder, MeshSource, TrianglePoint};
 pub(crate) use parallelogram::{ParallelogramShadow, PlaneSide};

@@ -6,14 +6,14 @@
 use arrayvec::ArrayVec;
 use fearless_simd::Level;
 
-use super::occluders::{OccluderList, ShadowMesh};
+use super::occluders::OccluderList;
 use super::shaft::{Horizon, Shaft};
 use super::target::{LightHull, Target};
 use super::{Viewpoint, Visibility};
 use crate::accel::Aabb;
 use crate::ids::LightId;
 use crate::math::{DVec3, ErrorBound, Vec3};
-use crate::scene::{Listed, Opacity, Placed, PlacedTarget, Scene};
+use crate::scene::{Listed, Opacity, Placed, PlacedTarget, Scene, ShadowMesh};
 use crate::shape::{Parallelogram, PlaneSide, Solid, Sphere};
 
 /// A set of receivers, and the listed shapes that may occlude lights from them. Keeps its memory.
@@ -49,8 +49,7 @@ impl ClusterVisibility {
         self.points.clear();
         (self.bounds, self.apart, self.room) = (Aabb::EMPTY, Vec3::ZERO, 0.0);
         let mut max_radius: f32 = 0.0;
-        let mut horizon: Option<Horizon> = None;
-        let mut shared = true;
+        let mut is_flat = true;
         for (point, radius, curved) in receivers {
             for side in [-radius, radius] {
                 self.bounds = self.bounds.with(point.p + side).with(point.start + side);
@@ -58,22 +57,14 @@ impl ClusterVisibility {
             self.apart = self.apart.max(point.apart());
             self.room = self.room.max(point.error.0.length() * 4.0);
             max_radius = max_radius.max(radius);
-            let n = point.horizon;
-            let least = n.as_dvec3().dot(point.p.as_dvec3()).min(n.as_dvec3().dot(point.start.as_dvec3()));
-            match &mut horizon {
-                None => horizon = Some(Horizon { n, least }),
-                Some(horizon) if horizon.n == n => horizon.least = horizon.least.min(least),
-                Some(_) => shared = false,
-            }
-            shared &= !curved;
+            is_flat &= !curved;
             self.points.push(point);
         }
-        self.horizon = horizon.filter(|_| shared);
-        let mut spheres = std::mem::take(&mut self.spheres);
-        spheres.clear();
-        let listed = scene.occluders.surface_spheres().iter().enumerate();
-        spheres.extend(listed.filter(|(_, sphere)| !self.is_below_horizons(&sphere.shape)).map(|(i, _)| i as u32));
-        self.spheres = spheres;
+        self.horizon = Horizon::shared(self.points.iter()).filter(|_| is_flat);
+        self.spheres.clear();
+        let listed = (0..).zip(scene.occluders.surface_spheres());
+        let points = &self.points;
+        self.spheres.extend(listed.filter(|(_, sphere)| !is_below_horizons(points, &sphere.shape)).map(|(i, _)| i));
         self.flats.clear();
         for (i, flat) in scene.occluders.flats.iter().enumerate() {
             if let Some(side) = side_of(&flat.shape, &self.points, max_radius) {
@@ -82,16 +73,10 @@ impl ClusterVisibility {
         }
     }
 
-    /// The visibility of the box from `low` to `high` that holds the lights of a cluster, `light` being one of them:
-    /// full or none where that is proved for all receivers and the whole box, `None` elsewhere.
-    pub fn classify(
-        &mut self,
-        level: Level,
-        scene: &Scene,
-        low: Vec3,
-        high: Vec3,
-        light: LightId,
-    ) -> Option<Visibility> {
+    /// The visibility of the box that holds the `lights` of a cluster, `light` being one of them: full or none where
+    /// that is proved for all receivers and the whole box, `None` elsewhere.
+    pub fn classify(&mut self, level: Level, scene: &Scene, lights: Aabb, light: LightId) -> Option<Visibility> {
+        let Aabb { min: low, max: high } = lights;
         let middle = low + (high - low) * 0.5;
         let half = high - middle;
         let axes = [Vec3::new(half.x, 0.0, 0.0), Vec3::new(0.0, half.y, 0.0), Vec3::new(0.0, 0.0, half.z)];
@@ -145,11 +130,11 @@ impl ClusterVisibility {
         let target = Target::without_samples(light, hull);
         let shaft = Shaft { horizon: self.horizon, ..shaft };
         self.occluders.gather_in(level, scene, &target, &shaft, MAX_LEAVES);
-        self.classify_behind_trees(scene, &target, &shaft, room)
+        self.classify_behind_trees(scene, &target, room)
     }
 
     /// The visibility past what was gathered of the trees.
-    fn classify_behind_trees(&self, scene: &Scene, target: &Target, shaft: &Shaft, room: f64) -> Option<Visibility> {
+    fn classify_behind_trees(&self, scene: &Scene, target: &Target, room: f64) -> Option<Visibility> {
         let found = &self.occluders;
         if found.too_many {
             return None;
@@ -168,7 +153,7 @@ impl ClusterVisibility {
             clear = false;
         }
         for sphere in found.spheres.iter().map(|which| scene.sphere(*which)) {
-            if self.is_below_horizons(sphere) {
+            if is_below_horizons(&self.points, sphere) {
                 continue;
             }
             if self.is_hidden_by_sphere(sphere, min, max) {
@@ -176,49 +161,36 @@ impl ClusterVisibility {
             }
             clear = false;
         }
-        let is_below = |q: DVec3, more: f64| {
-            shaft.horizon.is_some_and(|h| h.n.as_dvec3().dot(q) <= h.least + f64::from(self.room) + room + more)
-        };
         let is_clear = clear
             && found.others.iter().all(|thing| {
-                self.is_out_of_the_way(scene, &scene.geometry.placed[*thing as usize], middle, half, &is_below)
+                self.is_out_of_the_way(scene, &scene.geometry.placed[*thing as usize], middle, half, room)
             })
             && found.leaves.iter().all(|(source, leaf)| {
                 let Some(mesh) = ShadowMesh::of(&scene.geometry, *source, target.light) else { return true };
                 let mut triangles = mesh.mesh.tree.leaf(*leaf);
                 triangles.all(|(triangle, corners)| {
-                    let corners = corners.map(|q| match mesh.placement {
-                        Some(placement) => placement.world_from_object.transform_point3(q.as_dvec3()),
-                        None => q.as_dvec3(),
-                    });
+                    let corners = corners.map(|q| mesh.in_world(q));
                     let edge = (corners[1] - corners[0]).length().max((corners[2] - corners[0]).length());
-                    !mesh.casts(triangle) || corners.iter().all(|q| is_below(*q, edge * 1e-6))
+                    !mesh.casts(triangle) || corners.iter().all(|q| self.is_below(*q, room, edge * 1e-6))
                 })
             });
         is_clear.then_some(Visibility::Full)
     }
 
-    /// Whether a sphere is below the horizon of every receiver.
-    fn is_below_horizons(&self, sphere: &Sphere) -> bool {
-        self.points.iter().all(|point| sphere.shadow(point.p, point.error).is_below(point.horizon))
+    /// Whether a point is below the horizon that all receivers share.
+    fn is_below(&self, q: DVec3, room: f64, more: f64) -> bool {
+        self.horizon.is_some_and(|h| h.n.as_dvec3().dot(q) <= h.least + f64::from(self.room) + room + more)
     }
 
     /// Whether a solid is below all horizons, or a plane has all receivers and the box on one side.
-    fn is_out_of_the_way(
-        &self,
-        scene: &Scene,
-        placed: &Placed,
-        middle: Vec3,
-        half: Vec3,
-        is_below: &impl Fn(DVec3, f64) -> bool,
-    ) -> bool {
+    fn is_out_of_the_way(&self, scene: &Scene, placed: &Placed, middle: Vec3, half: Vec3, room: f64) -> bool {
         let PlacedTarget::Solid(solid) = placed.target else { return false };
         let solid = &scene.geometry.solids[solid as usize];
         let world = &placed.placement.world_from_object;
         if let Solid::Plane(plane) = solid {
             let (p, n) = plane.place();
             let p = world.transform_point3(p);
-            let n = (placed.placement.object_from_world.matrix3.transpose() * n).normalize_or_zero();
+            let n = placed.placement.normal(n).normalize_or_zero();
             let height = |q: Vec3| n.dot(q.as_dvec3() - p);
             let margin = f64::from(self.room);
             let reach = n.abs().dot(half.as_dvec3()) + margin;
@@ -228,7 +200,9 @@ impl ClusterVisibility {
             return side(1.0) || side(-1.0);
         }
         let Some([low, high]) = solid.bounds() else { return false };
-        (0..8).all(|i| is_below(world.transform_point3(corner(low.to_array(), high.to_array(), i).into()), 0.0))
+        (0..8).all(|i| {
+            self.is_below(world.transform_point3(corner(low.to_array(), high.to_array(), i).into()), room, 0.0)
+        })
     }
 
     fn is_hidden_by_flat(&self, flat: &Parallelogram, low: Vec3, high: Vec3) -> bool {
@@ -256,6 +230,11 @@ impl ClusterVisibility {
             })
         })
     }
+}
+
+/// Whether a sphere is below the horizon of every receiver.
+fn is_below_horizons(points: &[Viewpoint], sphere: &Sphere) -> bool {
+    points.iter().all(|point| sphere.shadow(point.p, point.error).is_below(point.horizon))
 }
 
 /// Corner `i` of a box.

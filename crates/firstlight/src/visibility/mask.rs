@@ -3,13 +3,12 @@
 use fearless_simd::{Level, f32x16, prelude::*};
 
 use super::Viewpoint;
-use super::occluders::ShadowMesh;
-use super::target::{LightSeen, SampleBlock, Target};
+use super::target::{SampleBlock, Target};
 use super::view::ShadowView;
 use crate::accel::{RayPacket16, dispatch_all};
 use crate::math::{LANES, ShadowRay, UNIT_ROUNDOFF, Vec3, least_and_most};
-use crate::scene::{Scene, ShadowRays};
-use crate::shape::{SeenParts, SeenTriangle};
+use crate::scene::{Scene, ShadowMesh, ShadowRays};
+use crate::shape::{LightSeen, SeenParts, SeenTriangle, bits};
 
 impl ShadowView {
     /// Fills [`hidden`](Self::hidden) with the samples that triangles, solids and point sets hide, and those that are
@@ -52,10 +51,7 @@ impl ShadowView {
         // From the order of the blocks to that of the light's samples
         self.hidden.resize(count, 0);
         for (block, hidden) in target.blocks.iter().zip(&self.in_space) {
-            let mut rest = hidden & block.present;
-            while rest != 0 {
-                let lane = rest.trailing_zeros() as usize % LANES;
-                rest &= rest - 1;
+            for lane in bits(u64::from(hidden & block.present)) {
                 let k = block.sample[lane] as usize;
                 self.hidden[k / LANES] |= 1 << (k % LANES);
             }
@@ -67,16 +63,12 @@ impl ShadowView {
     fn mask_triangles<S: Simd>(&mut self, simd: S, scene: &Scene, target: &Target, point: &Viewpoint) {
         // Samples below the horizon count as hidden
         let seen = target.hull.from(point.p);
-        let size = point.horizon.abs();
-        let wrong = (size.x + size.y + size.z) * seen.longest * (64.0 * UNIT_ROUNDOFF);
-        let middle = point.horizon.dot(seen.l);
-        let [a, b, c] = seen.axes;
-        let slopes = [point.horizon.dot(a), point.horizon.dot(b), point.horizon.dot(c)];
-        if middle - (slopes[0].abs() + slopes[1].abs() + slopes[2].abs()) < wrong {
+        let wrong = point.horizon.abs().element_sum() * seen.longest * (64.0 * UNIT_ROUNDOFF);
+        let (middle, reach) = seen.range(point.horizon);
+        if middle - reach < wrong {
+            let slopes = seen.axes.map(|axis| point.horizon.dot(axis));
             for (block, hidden) in target.blocks.iter().zip(&mut self.in_space) {
-                let x = f32x16::load_array_ref(simd, &block.at[0]);
-                let y = f32x16::load_array_ref(simd, &block.at[1]);
-                let z = f32x16::load_array_ref(simd, &block.at[2]);
+                let [x, y, z] = [0, 1, 2].map(|axis: usize| f32x16::load_array_ref(simd, &block.at[axis]));
                 let height = z * slopes[2] + (y * slopes[1] + (x * slopes[0] + middle));
                 *hidden |= height.simd_lt(-wrong).to_bitmask() as u16;
             }
@@ -117,10 +109,7 @@ impl ShadowView {
                     break;
                 }
                 let verdict = triangle.cells(simd, &cells.middle, &cells.half, &parts);
-                let mut some = (verdict.hidden | verdict.unsure) & open;
-                while some != 0 {
-                    let i = some.trailing_zeros() as usize % LANES;
-                    some &= some - 1;
+                for i in bits(u64::from((verdict.hidden | verdict.unsure) & open)) {
                     let (block, hidden) = (&target.blocks[places[i] as usize], &mut self.in_space[places[i] as usize]);
                     if verdict.hidden >> i & 1 == 1 {
                         *hidden = u16::MAX;
@@ -178,11 +167,11 @@ fn shadow_rays<'a, S: Simd>(
         l.store_slice(&mut shadows.rays.d[axis]);
     }
     // `ShadowRay::end`, operation by operation
-    let o = point.start.abs();
+    let o = point.start.abs().element_sum();
     let length = l[0].abs() + l[1].abs() + l[2].abs();
     let plane = from[0].to.plane;
     let approach = if plane == Vec3::ZERO { length } else { (l[0] * plane.x + l[1] * plane.y + l[2] * plane.z).abs() };
-    let end = -((length + (o.x + o.y + o.z)) / approach * (32.0 * UNIT_ROUNDOFF)) + 1.0;
+    let end = -((length + o) / approach * (32.0 * UNIT_ROUNDOFF)) + 1.0;
     end.store_slice(&mut shadows.t_end);
     shadows
 }
@@ -203,14 +192,9 @@ fn by_kernel<S: Simd>(
         || {
             let Some(mesh) = ShadowMesh::of(&scene.geometry, triangle.source, target.light) else { return 0 };
             let from = [point.ray(target.end(), Vec3::ZERO, true)];
-            let mut shadows = shadow_rays(simd, &from, point, block);
-            if let Some(placement) = mesh.placement {
-                for lane in (0..LANES).filter(|lane| unsure >> lane & 1 == 1) {
-                    let line = placement.line(shadows.rays.o(lane), shadows.rays.d(lane));
-                    shadows.rays.set(lane, line.o.as_vec3(), line.d.as_vec3());
-                }
-            }
-            mesh.mesh.tree.meets(simd, &shadows.rays, &shadows.t_end, triangle, unsure)
+            let shadows = shadow_rays(simd, &from, point, block);
+            let own = mesh.own_rays(&shadows.rays, unsure);
+            mesh.mesh.tree.meets(simd, own.as_ref().unwrap_or(&shadows.rays), &shadows.t_end, triangle, unsure)
         },
     )
 }

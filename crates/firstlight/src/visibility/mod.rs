@@ -20,8 +20,9 @@ mod tests;
 mod view;
 
 pub(crate) use cluster_visibility::ClusterVisibility;
-pub(crate) use occluders::{OccluderList, ShadowMesh};
+pub(crate) use occluders::OccluderList;
 pub(crate) use resolver::{VisibilityResolver, VisibilityStats};
+pub(crate) use shaft::Shaft;
 pub(crate) use target::Target;
 pub(crate) use view::{ShadowView, Visibility};
 

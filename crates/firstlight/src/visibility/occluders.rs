@@ -6,10 +6,9 @@ use super::Viewpoint;
 use super::shaft::{Horizon, Shaft};
 use super::target::Target;
 use crate::accel::dispatch_all;
-use crate::ids::{LightId, SurfaceId};
-use crate::math::Vec3;
-use crate::scene::{Geometry, Opacity, PlacedTarget, Scene, UpperItem};
-use crate::shape::{Mesh, Parallelogram, Placement, PlaneSide, Sphere};
+use crate::ids::LightId;
+use crate::scene::{Geometry, MeshNumber, PlacedTarget, Scene, ShadowMesh, UpperItem};
+use crate::shape::{Parallelogram, PlaneSide, Sphere};
 
 /// A sphere or parallelogram, by its index in the list of occluders or in the upper tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,9 +16,6 @@ pub(crate) enum ShapeRef {
     Listed(u32),
     InTree(u32),
 }
-
-/// An instance of a mesh: 0 is the mesh in world coordinates, n the placed thing of index n - 1.
-pub(crate) type MeshNumber = u32;
 
 /// A superset of what occludes one light from a group of points, rounding included. Keeps its memory.
 #[derive(Debug, Default)]
@@ -36,45 +32,6 @@ pub(crate) struct OccluderList {
     pub too_many: bool,
     /// Placed meshes whose boxes intersect the shaft.
     meshes: Vec<MeshNumber>,
-}
-
-/// An instance of a mesh, and which of its triangles occlude a light.
-pub(crate) struct ShadowMesh<'a> {
-    pub mesh: &'a Mesh,
-    pub placement: Option<&'a Placement>,
-    first: SurfaceId,
-    opacity: Opacity,
-    geometry: &'a Geometry,
-    light: LightId,
-}
-
-impl<'a> ShadowMesh<'a> {
-    /// The instance `source`, as an occluder of `light`; `None` if it is no mesh.
-    pub fn of(geometry: &'a Geometry, source: MeshNumber, light: LightId) -> Option<Self> {
-        if source == 0 {
-            let world = geometry.world.as_ref()?;
-            let mesh = &world.mesh;
-            return Some(ShadowMesh {
-                mesh,
-                placement: None,
-                first: SurfaceId(0),
-                opacity: world.shadow,
-                geometry,
-                light,
-            });
-        }
-        let thing = &geometry.placed[source as usize - 1];
-        let PlacedTarget::Mesh(mesh) = thing.target else { return None };
-        let mesh = &geometry.meshes[mesh as usize];
-        let (placement, first) = (Some(&thing.placement), thing.surface);
-        Some(ShadowMesh { mesh, placement, first, opacity: thing.shadow, geometry, light })
-    }
-
-    /// Whether a triangle casts shadows of the light.
-    #[inline(always)]
-    pub fn casts(&self, triangle: u32) -> bool {
-        self.geometry.triangle_casts(self.mesh, self.first, self.opacity, triangle, self.light)
-    }
 }
 
 /// Relative errors of the test of a sphere: in its radius, and in the distance.
@@ -230,35 +187,6 @@ impl OccluderList {
             }
         }
         true
-    }
-
-    /// Gathers from the trees the occluders between a light and a patch of surface, `curved` or flat, of radius `reach`
-    /// around `point`: at most `cap` leaves.
-    #[allow(clippy::too_many_arguments, reason = "a light of a scene, and a patch")]
-    pub fn gather_around(
-        &mut self,
-        level: Level,
-        scene: &Scene,
-        target: &Target,
-        point: &Viewpoint,
-        reach: f32,
-        curved: bool,
-        cap: usize,
-    ) {
-        let mut points = [*point; 2];
-        if reach > 0.0 {
-            for (point, side) in points.iter_mut().zip([-1.0, 1.0]) {
-                point.p += Vec3::splat(reach * side);
-                point.start += Vec3::splat(reach * side);
-            }
-            if curved {
-                // The horizon differs over the patch: the shaft has none
-                points[1].horizon = -point.horizon;
-            }
-        }
-        let indices = &[0, 1][..if reach > 0.0 { 2 } else { 1 }];
-        let shaft = Shaft::of(&points, indices, &target.hull);
-        self.gather_in(level, scene, target, &shaft, cap);
     }
 
     /// Gathers from the trees what intersects a shaft to a light: at most `cap` leaves. The same with every instruction

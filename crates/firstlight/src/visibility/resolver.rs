@@ -14,11 +14,10 @@ use crate::scene::Scene;
 const MAX_LEAVES: usize = 8;
 /// Up to so many points are not split into quarters but into single points.
 const FEW_POINTS: usize = 16;
-/// The most leaves in the shaft of one point, nearest first, and how many more for each block of samples. Samples that
-/// none of them hides are traced. Ten times as many leave half as many samples to trace, and take twice the time on
+/// The most leaves in the shaft of one point, nearest first, and one more for each block of samples. Samples that none
+/// of them hides are traced. Ten times as many leave half as many samples to trace, and take twice the time on
 /// triangles of a pixel's size.
 const MAX_LEAVES_OF_POINT: usize = 16;
-const LEAVES_PER_BLOCK: usize = 1;
 /// The number of blocks to assume for that where the light has no samples, since it is integrated.
 const BLOCKS_OF_INTEGRATED: usize = 64;
 /// The most leaves in the shaft of few points to a light that is integrated; with more, rays are traced.
@@ -69,7 +68,8 @@ impl VisibilityResolver {
         while let Some((start, end)) = parts.pop() {
             let part = &mut order[start..end];
             let blocks = if target.blocks.is_empty() { BLOCKS_OF_INTEGRATED } else { target.blocks.len() };
-            let cap = if part.len() > 1 { MAX_LEAVES } else { MAX_LEAVES_OF_POINT + LEAVES_PER_BLOCK * blocks };
+            let cap_of_point = MAX_LEAVES_OF_POINT + blocks;
+            let cap = if part.len() > 1 { MAX_LEAVES } else { cap_of_point };
             self.occluders.gather(level, scene, target, points, part, cap);
             counts.shafts += 1;
             // With too many leaves in the shaft of few points the caller traces rays through the trees
@@ -82,8 +82,8 @@ impl VisibilityResolver {
                 is_traced = self.occluders.too_many;
                 // The shaft of all may hold so many leaves where those of single points hold few
                 if is_traced && part.len() > 1 {
-                    let cap = MAX_LEAVES_OF_POINT + LEAVES_PER_BLOCK * BLOCKS_OF_INTEGRATED;
-                    self.occluders_of_one.gather(level, scene, target, points, &part[part.len() / 2..][..1], cap);
+                    let one = &part[part.len() / 2..][..1];
+                    self.occluders_of_one.gather(level, scene, target, points, one, cap_of_point);
                     counts.shafts += 1;
                     is_traced = self.occluders_of_one.too_many;
                 }
@@ -98,14 +98,9 @@ impl VisibilityResolver {
                 // Split into quarters
                 let middle = split(points, part);
                 let (left, right) = part.split_at_mut(middle);
-                let quarters = [split(points, left), middle, middle + split(points, right), end - start];
-                let mut first = 0;
-                for last in quarters {
-                    if last > first {
-                        parts.push((start + first, start + last));
-                    }
-                    first = last;
-                }
+                let ends = [0, split(points, left), middle, middle + split(points, right), end - start];
+                let quarters = ends.windows(2).filter(|ends| ends[0] < ends[1]);
+                parts.extend(quarters.map(|ends| (start + ends[0], start + ends[1])));
                 continue;
             }
             counts.occluders += self.occluders.count() as u64;
@@ -127,7 +122,7 @@ impl VisibilityResolver {
 fn split(points: &[Viewpoint], part: &mut [u32]) -> usize {
     let bounds = part.iter().fold(Aabb::EMPTY, |bounds, k| bounds.with(points[*k as usize].start));
     let size = bounds.max - bounds.min;
-    let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
+    let axis = size.max_position();
     let middle = bounds.min[axis] + size[axis] * 0.5;
     let mut left = 0;
     for i in 0..part.len() {

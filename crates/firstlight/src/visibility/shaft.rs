@@ -16,7 +16,7 @@ use fearless_simd::{f32x8, prelude::*};
 use super::Viewpoint;
 use super::target::LightHull;
 use crate::accel::{Aabb, BEAM_PAD, BoxNode};
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, ErrorBound, Vec3};
 use crate::shape::Placement;
 
 /// The half-space n.x >= `least`, which holds all rays that carry light to the points.
@@ -26,6 +26,20 @@ pub(crate) struct Horizon {
     pub n: Vec3,
     /// The least n.x of the points.
     pub least: f64,
+}
+
+impl Horizon {
+    /// That of some points, if all have the same.
+    pub fn shared<'a>(mut points: impl Iterator<Item = &'a Viewpoint>) -> Option<Horizon> {
+        let least = |point: &Viewpoint| {
+            let n = point.horizon.as_dvec3();
+            n.dot(point.p.as_dvec3()).min(n.dot(point.start.as_dvec3()))
+        };
+        let first = points.next()?;
+        points.try_fold(Horizon { n: first.horizon, least: least(first) }, |Horizon { n, least: before }, point| {
+            (point.horizon == n).then(|| Horizon { n, least: before.min(least(point)) })
+        })
+    }
 }
 
 /// The hull of a box of points and a light.
@@ -50,9 +64,8 @@ pub(crate) struct TreeShaft {
     /// low plane.
     lines: [[Line; 2]; 3],
     s_max: f32,
-    n: Vec3,
-    least: f32,
-    has_horizon: bool,
+    /// The normal of the horizon that all points share, and the least height over it.
+    horizon: Option<(Vec3, f32)>,
 }
 
 /// A linear bound on s: plane x `r` + `c`.
@@ -88,30 +101,31 @@ impl Shaft {
     /// The shaft from some of the points to a light.
     pub fn of(points: &[Viewpoint], indices: &[u32], hull: &LightHull) -> Shaft {
         let (mut starts, mut apart) = (Aabb::EMPTY, Vec3::ZERO);
-        let first = &points[indices[0] as usize];
-        let mut horizon = Some(Horizon { n: first.horizon, least: f64::INFINITY });
-        for point in indices.iter().map(|i| &points[*i as usize]) {
+        let points = || indices.iter().map(|i| &points[*i as usize]);
+        for point in points() {
             // The tests of some shapes start at the point itself
             starts = starts.with(point.start).with(point.p);
             apart = apart.max(point.apart());
-            match &mut horizon {
-                Some(horizon) if horizon.n == point.horizon => {
-                    let height = |v: Vec3| point.horizon.as_dvec3().dot(v.as_dvec3());
-                    horizon.least = horizon.least.min(height(point.p)).min(height(point.start));
-                }
-                _ => horizon = None,
-            }
         }
-        Shaft { horizon, ..Shaft::between(starts, hull, apart) }
+        Shaft { horizon: Horizon::shared(points()), ..Shaft::between(starts, hull, apart) }
+    }
+
+    /// The shaft from a patch of surface, `curved` or flat, of radius `reach` around `point`, to a light.
+    pub fn around(point: &Viewpoint, reach: f32, curved: bool, hull: &LightHull) -> Shaft {
+        let mut points = [*point; 2];
+        for (point, side) in points.iter_mut().zip([-1.0, 1.0]) {
+            point.p += Vec3::splat(reach * side);
+            point.start += Vec3::splat(reach * side);
+        }
+        let shaft = Shaft::of(&points, &[0, 1], hull);
+        // The horizon differs over a curved patch: the shaft has none
+        if curved && reach > 0.0 { Shaft { horizon: None, ..shaft } } else { shaft }
     }
 
     /// The same shaft in the object space of `placement`.
     pub fn in_object(&self, placement: &Placement, hull: &LightHull) -> Shaft {
         let m = &placement.object_from_world;
-        let size = |v: Vec3| {
-            let (a, v) = (&m.matrix3, v.as_dvec3());
-            a.x_axis.abs() * v.x + a.y_axis.abs() * v.y + a.z_axis.abs() * v.z
-        };
+        let size = |v: Vec3| placement.error_in_object(ErrorBound(v));
         let Aabb { min, max } = self.points;
         let middle = (min.as_dvec3() + max.as_dvec3()) * 0.5;
         let (center, half) = (m.transform_point3(middle), size((max - min) * 0.5) * (1.0 + 1e-6));
@@ -144,32 +158,19 @@ impl Shaft {
         let pad = reach * BEAM_PAD;
         let largest = self.low.abs().max(self.high.abs()).max_element();
         let least = (largest * SMALLEST).max(TINY);
-        let line = |axis: usize| {
-            let (d, from) = (self.low[axis], min[axis]);
-            let d = if d.abs() < least { -least } else { d };
+        // Of the low side, -1: from + s d <= high plane + pad; of the high side, 1: from + s d >= low plane - pad
+        let line = |d: f32, from: f32, side: f32| {
+            let d = if d.abs() < least { side * least } else { d };
             let r = 1.0 / d;
-            // from + s d <= high plane + pad
-            let low = Line { r, c: (pad - from) * r, enters: d < 0.0 };
-            let (d, from) = (self.high[axis], max[axis]);
-            let d = if d.abs() < least { least } else { d };
-            let r = 1.0 / d;
-            // from + s d >= low plane - pad
-            let high = Line { r, c: -(from + pad) * r, enters: d > 0.0 };
-            [low, high]
+            Line { r, c: (-side * pad - from) * r, enters: d * side > 0.0 }
         };
-        let (n, mut lowest) = (self.horizon.map_or(Vec3::ZERO, |h| h.n), f32::NEG_INFINITY);
-        if let Some(horizon) = &self.horizon {
-            let below = horizon.least - horizon.n.as_dvec3().dot(center.as_dvec3());
-            let n = n.abs();
-            lowest = below as f32 - (n.x + n.y + n.z) * (2.0 * pad);
-        }
-        TreeShaft {
-            lines: [line(0), line(1), line(2)],
-            s_max: self.s_max,
-            n,
-            least: lowest,
-            has_horizon: self.horizon.is_some(),
-        }
+        let lines =
+            [0, 1, 2].map(|axis| [line(self.low[axis], min[axis], -1.0), line(self.high[axis], max[axis], 1.0)]);
+        let horizon = self.horizon.map(|Horizon { n, least }| {
+            let below = least - n.as_dvec3().dot(center.as_dvec3());
+            (n, below as f32 - (n.x.abs() + n.y.abs() + n.z.abs()) * (2.0 * pad))
+        });
+        TreeShaft { lines, s_max: self.s_max, horizon }
     }
 
     /// Whether a box intersects the shaft, in f64 and with `room` as the only padding.
@@ -227,11 +228,11 @@ impl TreeShaft {
             }
         }
         let mut met = enter.simd_le(leave);
-        if self.has_horizon {
-            let top = |axis: usize| &planes[axis][usize::from(self.n[axis] >= 0.0)];
-            let height = f32x8::load_array_ref(simd, top(0)) * self.n.x;
-            let height = line(top(2), self.n.z, line(top(1), self.n.y, height));
-            met &= height.simd_ge(self.least);
+        if let Some((n, least)) = self.horizon {
+            let top = |axis: usize| &planes[axis][usize::from(n[axis] >= 0.0)];
+            let height = f32x8::load_array_ref(simd, top(0)) * n.x;
+            let height = line(top(2), n.z, line(top(1), n.y, height));
+            met &= height.simd_ge(least);
         }
         (met.to_bitmask() as u32, enter)
     }

@@ -4,9 +4,10 @@ use fearless_simd::{Level, f32x16, prelude::*};
 
 use crate::accel::{Aabb, dispatch_all};
 use crate::ids::LightId;
-use crate::light::{Light, PointBlock, Points, Towards};
+use crate::light::{Light, Points, Towards};
 use crate::math::{Axes, DMat3, DVec3, LANES, LightEnd, Vec3, least_and_most};
 use crate::scene::Scene;
+use crate::shape::LightSeen;
 
 /// An oriented box around a light: the points `center` + u `axes[0]` + v `axes[1]` + w `axes[2]`, each of u, v, w from
 /// -1 to 1. For a light that is infinitely far away, its direction `center`.
@@ -20,24 +21,6 @@ pub(crate) struct LightHull {
     pub is_ball: bool,
     /// The unit normal of a flat light; 0 for all others.
     pub plane: Vec3,
-}
-
-/// A light relative to one point: the vectors `l` + u `axes[0]` + v `axes[1]` + w `axes[2]` from the point to its box.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LightSeen {
-    pub l: Vec3,
-    pub axes: [Vec3; 3],
-    /// An upper bound of the largest coordinate of any of the vectors.
-    pub longest: f32,
-    /// A lower bound of the largest coordinate of each of the vectors.
-    pub shortest: f32,
-    pub finite: bool,
-    /// See [`LightHull::plane`].
-    pub plane: Vec3,
-    /// The axes along which projections of occluders are bounded; those of a sphere face the point.
-    pub frame: [Vec3; 3],
-    /// The distance of the center of a sphere, in radii.
-    pub radii: Option<f32>,
 }
 
 /// Sixteen samples of a light, by their coordinates along the axes of its box. Lanes without a sample repeat one.
@@ -94,14 +77,8 @@ impl LightHull {
         let axes = [e0, e1, thin].map(|axis| axis.as_vec3());
         let mut hull = LightHull { center, axes, finite: true, is_ball: false, plane: Vec3::ZERO };
         // Fit the axes to the points, then enlarge the box while rounding leaves a point outside
-        let mut needed = [0.0f64; 3];
-        for q in points {
-            let at = hull.coordinates(*q);
-            for (axis, needed) in needed.iter_mut().enumerate() {
-                *needed = needed.max(at[axis].abs());
-            }
-        }
-        for (axis, needed) in hull.axes.iter_mut().zip(needed) {
+        let needed = points.iter().fold(DVec3::ZERO, |needed, q| needed.max(hull.coordinates(*q).abs()));
+        for (axis, needed) in hull.axes.iter_mut().zip(needed.to_array()) {
             *axis = (axis.as_dvec3() * (needed * (1.0 + ROOM)).max(ROOM)).as_vec3();
         }
         while !points.iter().all(|q| hull.coordinates(*q).abs().max_element() <= 1.0) {
@@ -163,33 +140,17 @@ impl LightHull {
 }
 
 impl SampleBlock {
-    /// The block of at most sixteen samples.
-    fn of(samples: &[Sample]) -> SampleBlock {
-        let mut block = SampleBlock {
-            at: [[0.0; LANES]; 3],
-            point: [[0.0; LANES]; 3],
-            sample: [0; LANES],
-            present: ((1u32 << samples.len()) - 1) as u16,
-        };
-        for lane in 0..LANES {
-            let (k, q, at) = samples[lane.min(samples.len() - 1)];
-            for axis in 0..3 {
-                block.at[axis][lane] = at[axis] as f32;
-                block.point[axis][lane] = q[axis];
-            }
-            block.sample[lane] = k;
-        }
-        block
-    }
-
-    /// The samples of a block of points, the first of which has index `first`. In lanes where it is called within
-    /// `vectorize`.
+    /// The block of samples with these numbers and points. In lanes where it is called within `vectorize`.
     #[inline(always)]
-    fn of_points(first: usize, points: &PointBlock, inverse: &DMat3, center: DVec3) -> SampleBlock {
-        let point = points.coordinates();
+    fn new(
+        sample: [u32; LANES],
+        point: [[f32; LANES]; 3],
+        present: u16,
+        inverse: &DMat3,
+        center: DVec3,
+    ) -> SampleBlock {
         let [x, y, z] = inverse.to_cols_array_2d();
         let mut at = [[0.0; LANES]; 3];
-        let mut sample = [0; LANES];
         for k in 0..LANES {
             let (dx, dy, dz) = (
                 f64::from(point[0][k]) - center.x,
@@ -199,9 +160,8 @@ impl SampleBlock {
             for axis in 0..3 {
                 at[axis][k] = ((x[axis] * dx + y[axis] * dy) + z[axis] * dz) as f32;
             }
-            sample[k] = (first + k) as u32;
         }
-        SampleBlock { at, point, sample, present: u16::MAX }
+        SampleBlock { at, point, sample, present }
     }
 }
 
@@ -218,23 +178,6 @@ impl BlockBounds {
             }
         }
         bounds
-    }
-}
-
-impl LightSeen {
-    #[inline(always)]
-    pub fn new(l: Vec3, axes: [Vec3; 3], finite: bool) -> Self {
-        let reach = axes[0].abs() + axes[1].abs() + axes[2].abs();
-        let longest = (l.abs() + reach).max_element() * (1.0 + 4.0 * f32::EPSILON);
-        let shortest = ((l.abs() - reach).max_element() - longest * (4.0 * f32::EPSILON)).max(0.0);
-        LightSeen { l, axes, longest, shortest, finite, plane: Vec3::ZERO, frame: axes, radii: None }
-    }
-
-    /// The range of f.w over the vectors w to the light, without rounding: its center and half its length.
-    #[inline(always)]
-    pub fn range(&self, f: Vec3) -> (f32, f32) {
-        let [a, b, c] = self.axes;
-        (f.dot(self.l), f.dot(a).abs() + f.dot(b).abs() + f.dot(c).abs())
     }
 }
 
@@ -264,7 +207,13 @@ impl Target {
         let sample = |k: usize| (k as u32, points.get(k), inverse * (points.get(k).as_dvec3() - center));
         let mut samples: Vec<Sample> = (0..points.count()).map(sample).collect();
         gather_neighbours(&mut samples);
-        let blocks = samples.chunks(LANES).map(SampleBlock::of).collect();
+        let block = |samples: &[Sample]| {
+            let lane = |k: usize| samples[k.min(samples.len() - 1)];
+            let points = [0, 1, 2].map(|axis| std::array::from_fn(|k| lane(k).1[axis]));
+            let present = ((1u32 << samples.len()) - 1) as u16;
+            SampleBlock::new(std::array::from_fn(|k| lane(k).0), points, present, &inverse, center)
+        };
+        let blocks = samples.chunks(LANES).map(block).collect();
         Target { blocks, is_in_order: false, ..Target::without_samples(self.light, self.hull) }.bounded(level)
     }
 
@@ -274,7 +223,8 @@ impl Target {
         let mut blocks = Vec::with_capacity(points.blocks.len());
         dispatch_all!(level, _simd => {
             for (number, block) in points.blocks.iter().enumerate() {
-                blocks.push(SampleBlock::of_points(number * LANES, block, &inverse, center));
+                let sample = std::array::from_fn(|k| (number * LANES + k) as u32);
+                blocks.push(SampleBlock::new(sample, block.0, u16::MAX, &inverse, center));
             }
         });
         Target { blocks, ..Target::without_samples(self.light, self.hull) }.bounded(level)

@@ -1,4 +1,5 @@
 use fearless_simd::Level;
+use firstlight_testkit::Random;
 
 use super::shaft::{Horizon, Shaft};
 use super::target::LightHull;
@@ -8,42 +9,22 @@ use crate::math::{DVec3, Ray};
 use crate::scene::{CompileOptions, Scene, SceneDesc};
 use crate::shape::RayDifferential;
 use crate::{
-    CameraDesc, DiskLightDesc, EmitSides, GroupDesc, InstanceDesc, LightDesc, MeshDesc, NoAssets, ParallelogramDesc,
-    PlaneDesc, PointDesc, RectangleDesc, ShapeDesc, SphereDesc, SphereLightDesc, TransformDesc,
+    CameraDesc, DirectionalDesc, DiskLightDesc, EmitSides, GroupDesc, InstanceDesc, LightDesc, MeshDesc, NoAssets,
+    ParallelogramDesc, PlaneDesc, PointDesc, RectangleDesc, ShapeDesc, SphereDesc, SphereLightDesc, TransformDesc,
 };
 
-struct Random(firstlight_testkit::Random);
+fn vector(random: &mut Random, reach: f64) -> DVec3 {
+    random.vector(reach).into()
+}
 
-impl Random {
-    fn new(seed: u64) -> Self {
-        Random(firstlight_testkit::Random::new(seed))
-    }
+fn direction(random: &mut Random) -> DVec3 {
+    random.direction().into()
+}
 
-    fn unit(&mut self) -> f64 {
-        self.0.unit()
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.unit() * n as f64) as usize
-    }
-
-    fn vector(&mut self, reach: f64) -> DVec3 {
-        DVec3::new(self.unit(), self.unit(), self.unit()) * (2.0 * reach) - reach
-    }
-
-    fn direction(&mut self) -> DVec3 {
-        self.vector(1.0).normalize_or(DVec3::Y)
-    }
-
-    /// On whole and half numbers things touch and lie in one plane.
-    fn place(&mut self, reach: f64) -> DVec3 {
-        let v = self.vector(reach);
-        if self.unit() < 0.4 { (v * 2.0).round() * 0.5 } else { v }
-    }
-
-    fn scale(&mut self, low: f64, high: f64) -> f64 {
-        low * pxfm::f_pow(high / low, self.unit())
-    }
+/// On whole and half numbers things touch and lie in one plane.
+fn place(random: &mut Random, reach: f64) -> DVec3 {
+    let v = vector(random, reach);
+    if random.chance(0.4) { (v * 2.0).round() * 0.5 } else { v }
 }
 
 /// Whether a segment meets a box, in f64.
@@ -69,34 +50,28 @@ fn a_shaft_leaves_out_no_box_that_a_way_to_the_light_meets() {
     let mut left_out = 0;
     for round in 0..4000 {
         let unit = random.scale(1e-6, 1e6);
-        let origin = if random.unit() < 0.3 { random.direction() * unit * 1000.0 } else { DVec3::ZERO };
-        let at = |random: &mut Random, reach: f64| (origin + random.place(reach) * unit).as_vec3();
-        let spread = [0.0, 0.01, 1.0, 5.0][random.below(4)];
+        let origin = if random.chance(0.3) { direction(random) * unit * 1000.0 } else { DVec3::ZERO };
+        let at = |random: &mut Random, reach: f64| (origin + place(random, reach) * unit).as_vec3();
+        let spread = random.pick(&[0.0, 0.01, 1.0, 5.0]);
         let first = at(random, 2.0);
         let points: Vec<Vec3> =
-            (0..1 + random.below(4)).map(|_| first + (random.vector(spread) * unit).as_vec3()).collect();
+            (0..1 + random.below(4)).map(|_| first + (vector(random, spread) * unit).as_vec3()).collect();
         let finite = round % 5 != 0;
-        let size = [0.0, 0.5, 20.0][random.below(3)];
+        let size = random.pick(&[0.0, 0.5, 20.0]);
         let reach = random.scale(0.1, 1e4);
         let mut axes = [Vec3::ZERO; 3];
         for axis in &mut axes {
-            *axis = (random.place(1.0) * unit * size).as_vec3();
+            *axis = (place(random, 1.0) * unit * size).as_vec3();
         }
         let hull = if finite {
-            LightHull { center: at(random, reach), axes, finite, is_ball: false, plane: Vec3::ZERO }
+            LightHull { axes, ..LightHull::at(at(random, reach), true) }
         } else {
-            LightHull {
-                center: random.direction().as_vec3(),
-                axes: [Vec3::ZERO; 3],
-                finite,
-                is_ball: false,
-                plane: Vec3::ZERO,
-            }
+            LightHull::at(direction(random).as_vec3(), false)
         };
         let bounds = points.iter().fold(Aabb::EMPTY, |bounds, p| bounds.with(*p));
         let mut shaft = Shaft::between(bounds, &hull, Vec3::ZERO);
-        let n = random.direction().as_vec3();
-        let has_horizon = random.unit() < 0.5;
+        let n = direction(random).as_vec3();
+        let has_horizon = random.chance(0.5);
         if has_horizon {
             let least = points.iter().map(|p| n.as_dvec3().dot(p.as_dvec3())).fold(f64::INFINITY, f64::min);
             shaft.horizon = Some(Horizon { n, least });
@@ -107,15 +82,15 @@ fn a_shaft_leaves_out_no_box_that_a_way_to_the_light_meets() {
         let mut half = 0.0f32;
         let mut boxes = Vec::new();
         for place in 0..7 {
-            let p = points[random.below(points.len())].as_dvec3();
+            let p = random.pick(&points).as_dvec3();
             let mut to = hull.center.as_dvec3();
             for axis in &hull.axes {
-                let t = if random.unit() < 0.5 { random.unit() * 2.0 - 1.0 } else { 1.0 };
+                let t = if random.chance(0.5) { random.between(-1.0, 1.0) } else { 1.0 };
                 to += axis.as_dvec3() * t;
             }
             let to = if finite { to } else { p + to * unit * random.scale(1.0, 1e4) };
-            let on = if random.unit() < 0.7 { p + (to - p) * random.unit() } else { at(random, 3.0).as_dvec3() };
-            let size = random.vector(1.0).abs() * unit * [0.0, 1e-3, 1.0][random.below(3)];
+            let on = if random.chance(0.7) { p + (to - p) * random.unit() } else { at(random, 3.0).as_dvec3() };
+            let size = vector(random, 1.0).abs() * unit * random.pick(&[0.0, 1e-3, 1.0]);
             let shift = size * DVec3::new(random.unit(), random.unit(), random.unit());
             let (low, high) = ((on - shift).as_vec3(), (on - shift + size).as_vec3());
             let (a, b) = (low - center, high - center);
@@ -135,7 +110,8 @@ fn a_shaft_leaves_out_no_box_that_a_way_to_the_light_meets() {
                     for _ in 0..8 {
                         let mut to = hull.center.as_dvec3();
                         for axis in &hull.axes {
-                            to += axis.as_dvec3() * [-1.0, 1.0, random.unit() * 2.0 - 1.0][random.below(3)];
+                            let any = random.between(-1.0, 1.0);
+                            to += axis.as_dvec3() * random.pick(&[-1.0, 1.0, any]);
                         }
                         let p = p.as_dvec3();
                         let to = if finite { to } else { p + to * unit * 1e6 };
@@ -155,29 +131,29 @@ fn a_shaft_leaves_out_no_box_that_a_way_to_the_light_meets() {
 
 fn random_mesh(random: &mut Random, at: DVec3, unit: f64) -> MeshDesc {
     let mut mesh = MeshDesc::default();
-    if random.unit() < 0.5 {
+    if random.chance(0.5) {
         // Triangles anyhow: crossing, thin, huge, small
-        for i in 0..1 + random.below(60) as u32 {
+        for i in 0..1 + random.below(60) {
             let size = unit * random.scale(0.01, 3.0);
-            let first = at + random.place(1.5) * unit;
+            let first = at + place(random, 1.5) * unit;
             for k in 0..3 {
-                let thin = if k == 2 && random.unit() < 0.2 { 1e-4 } else { 1.0 };
-                mesh.positions.push((first + random.place(1.0) * size * thin).to_array());
+                let thin = if k == 2 && random.chance(0.2) { 1e-4 } else { 1.0 };
+                mesh.positions.push((first + place(random, 1.0) * size * thin).to_array());
             }
             mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
         }
         return mesh;
     }
     // A bumpy sheet, finely cut
-    let n = 3 + random.below(30) as u32;
-    let (e0, e1) = (random.direction() * unit * 2.0, random.direction() * unit * 2.0);
-    let up = e0.cross(e1).normalize_or(DVec3::Y) * unit * [0.0, 0.05, 0.5][random.below(3)];
+    let n = 3 + random.below(30);
+    let (e0, e1) = (direction(random) * unit * 2.0, direction(random) * unit * 2.0);
+    let up = e0.cross(e1).normalize_or(DVec3::Y) * unit * random.pick(&[0.0, 0.05, 0.5]);
     // Normals of something rounder, so that light is gathered above the triangles
-    let smooth = random.unit() < 0.4;
+    let smooth = random.chance(0.4);
     for j in 0..=n {
         for i in 0..=n {
             if smooth {
-                let n = up.normalize_or(e0.cross(e1).normalize_or(DVec3::Y)) + random.vector(0.3);
+                let n = up.normalize_or(e0.cross(e1).normalize_or(DVec3::Y)) + vector(random, 0.3);
                 mesh.normals.push(n.to_array());
             }
             let (x, y) = (f64::from(i) / f64::from(n) - 0.5, f64::from(j) / f64::from(n) - 0.5);
@@ -196,61 +172,58 @@ fn random_mesh(random: &mut Random, at: DVec3, unit: f64) -> MeshDesc {
 /// Meshes, some placed, spheres, parallelograms, a plane and lights that touch them, cut them, or lie in one plane with
 /// them.
 fn random_scene(random: &mut Random) -> Scene {
-    let unit = [1.0, 1.0, 1e-4, 1e4][random.below(4)];
-    let origin = if random.unit() < 0.2 { random.direction() * 300.0 * unit } else { DVec3::ZERO };
+    let unit = random.pick(&[1.0, 1.0, 1e-4, 1e4]);
+    let origin = if random.chance(0.2) { direction(random) * 300.0 * unit } else { DVec3::ZERO };
     let mut desc = SceneDesc::default();
-    let chosen = |random: &mut Random| (random.unit() < 0.2).then(|| vec!["one".to_owned()]);
+    let chosen = |random: &mut Random| random.chance(0.2).then(|| vec!["one".to_owned()]);
     for _ in 0..1 + random.below(2) {
-        let mut mesh = random_mesh(random, origin, unit);
-        mesh.shadow_exclude = chosen(random);
-        desc.shapes.push(ShapeDesc::Mesh(mesh));
+        let mesh = random_mesh(random, origin, unit);
+        desc.shapes.push(ShapeDesc::Mesh(MeshDesc { shadow_exclude: chosen(random), ..mesh }));
     }
-    if random.unit() < 0.4 {
+    if random.chance(0.4) {
         let mesh = random_mesh(random, DVec3::ZERO, unit);
         desc.groups.push(("g".to_owned(), GroupDesc { shapes: vec![ShapeDesc::Mesh(mesh)] }));
         for _ in 0..1 + random.below(4) {
-            let scale = [0; 3].map(|_| random.scale(0.2, 3.0) * if random.unit() < 0.2 { -1.0 } else { 1.0 });
+            let scale = [0; 3].map(|_| random.scale(0.2, 3.0) * if random.chance(0.2) { -1.0 } else { 1.0 });
             let transform = TransformDesc {
-                translate: (origin + random.place(2.0) * unit).to_array(),
-                rotate_deg: random.vector(180.0).to_array(),
+                translate: (origin + place(random, 2.0) * unit).to_array(),
+                rotate_deg: vector(random, 180.0).to_array(),
                 scale: crate::ScaleDesc::from(scale),
                 ..TransformDesc::default()
             };
             let mut instance = InstanceDesc::new("g".to_owned());
             instance.transform = Some(Box::new(transform));
-            instance.casts_shadow = random.unit() < 0.9;
+            instance.casts_shadow = random.chance(0.9);
             instance.shadow_exclude = chosen(random);
             desc.shapes.push(ShapeDesc::Instance(instance));
         }
     }
     for _ in 0..random.below(3) {
-        let center = origin + random.place(2.0) * unit;
-        let mut sphere = SphereDesc::new(center.to_array(), random.scale(0.02, 2.0) * unit);
-        sphere.shadow_exclude = chosen(random);
-        desc.shapes.push(ShapeDesc::Sphere(sphere));
+        let center = origin + place(random, 2.0) * unit;
+        let sphere = SphereDesc::new(center.to_array(), random.scale(0.02, 2.0) * unit);
+        desc.shapes.push(ShapeDesc::Sphere(SphereDesc { shadow_exclude: chosen(random), ..sphere }));
     }
     for _ in 0..random.below(3) {
-        let p = origin + random.place(2.0) * unit;
-        let (e0, e1) = (random.direction() * unit * random.scale(0.1, 5.0), random.direction() * unit);
+        let p = origin + place(random, 2.0) * unit;
+        let (e0, e1) = (direction(random) * unit * random.scale(0.1, 5.0), direction(random) * unit);
         if e0.cross(e1).length() > 1e-3 * e0.length() * e1.length() {
-            let mut flat = ParallelogramDesc::new(p.to_array(), e0.to_array(), e1.to_array());
-            flat.shadow_exclude = chosen(random);
-            desc.shapes.push(ShapeDesc::Parallelogram(flat));
+            let flat = ParallelogramDesc::new(p.to_array(), e0.to_array(), e1.to_array());
+            desc.shapes.push(ShapeDesc::Parallelogram(ParallelogramDesc { shadow_exclude: chosen(random), ..flat }));
         }
     }
-    if random.unit() < 0.3 {
-        let point = (origin + random.place(2.0) * unit).to_array();
+    if random.chance(0.3) {
+        let point = (origin + place(random, 2.0) * unit).to_array();
         let shadow_exclude = chosen(random);
         desc.shapes.push(ShapeDesc::Plane(PlaneDesc { point, shadow_exclude, ..PlaneDesc::default() }));
     }
     for i in 0..3 {
-        let reach = [0.5, 2.0, 5.0][random.below(3)];
-        let center = (origin + random.place(reach) * unit).to_array();
-        let a = random.direction();
-        let b = a.cross(random.direction()).normalize_or(a.any_orthonormal_vector());
+        let reach = random.pick(&[0.5, 2.0, 5.0]);
+        let center = (origin + place(random, reach) * unit).to_array();
+        let a = direction(random);
+        let b = a.cross(direction(random)).normalize_or(a.any_orthonormal_vector());
         let (x, y) = (random.scale(0.02, 4.0) * unit, random.scale(0.02, 4.0) * unit);
-        let samples = Some((1 + random.below(300) as u32).into());
-        let (sides, blocks) = (Some(EmitSides::Both), random.unit() < 0.4);
+        let samples = Some((1 + random.below(300)).into());
+        let (sides, blocks) = (Some(EmitSides::Both), random.chance(0.4));
         let name = (i == 0).then(|| "one".to_owned());
         desc.lights.push(match random.below(3) {
             0 => {
@@ -267,14 +240,11 @@ fn random_scene(random: &mut Random) -> Scene {
             }
         });
     }
-    let position = (origin + random.place(3.0) * unit).to_array();
+    let position = (origin + place(random, 3.0) * unit).to_array();
     desc.lights.push(LightDesc::Point(PointDesc::new(position)));
-    let mut directional = crate::DirectionalDesc::new(random.direction().to_array());
-    directional.strength = 1.0;
-    desc.lights.push(LightDesc::Directional(directional));
-    let eye = origin + random.direction() * unit * 4.0;
-    let mut camera = CameraDesc::new(eye.to_array());
-    camera.look_at = origin.to_array();
+    desc.lights.push(LightDesc::Directional(DirectionalDesc::new(direction(random).to_array())));
+    let eye = origin + direction(random) * unit * 4.0;
+    let camera = CameraDesc { look_at: origin.to_array(), ..CameraDesc::new(eye.to_array()) };
     desc.cameras.push((String::new(), camera));
     desc.compile(&NoAssets, &CompileOptions::default()).expect("it is a scene").scene
 }
@@ -282,7 +252,7 @@ fn random_scene(random: &mut Random) -> Scene {
 /// Points that neighbouring camera rays meet.
 fn seen_points(random: &mut Random, scene: &Scene) -> Vec<Viewpoint> {
     let middle = [random.unit() as f32 * scene.width as f32, random.unit() as f32 * scene.height as f32];
-    let apart = [0.3, 2.0, 40.0][random.below(3)];
+    let apart = random.pick(&[0.3, 2.0, 40.0]);
     let mut points = Vec::new();
     for i in 0..24 {
         let (x, y) = (middle[0] + (i % 6) as f32 * apart, middle[1] + (i / 6) as f32 * apart);
@@ -310,7 +280,7 @@ fn every_sample_is_answered_as_by_its_own_ray() {
         let points = seen_points(random, &scene);
         for (light, target) in scene.lights.iter().zip(Target::of_all(&scene)) {
             let index = target.light.index();
-            let level = levels[if round % 4 == 0 { random.below(levels.len()) } else { 0 }];
+            let level = if round % 4 == 0 { random.pick(&levels) } else { levels[0] };
             let mut counts = VisibilityStats::default();
             let mut order: Vec<u32> = (0..points.len() as u32).collect();
             let mut asked = 0;
@@ -358,21 +328,13 @@ fn a_light_lies_in_its_hull() {
     for _ in 0..60 {
         let scene = random_scene(random);
         for (light, target) in scene.lights.iter().zip(Target::of_all(&scene)) {
-            let held: usize = target.blocks.iter().map(|block| block.present.count_ones() as usize).sum();
-            let mut order: Vec<u32> = Vec::new();
+            let mut held: Vec<u32> = Vec::new();
             for block in &target.blocks {
-                for lane in 0..16 {
-                    assert!((0..3).all(|axis| block.at[axis][lane].abs() <= 1.0));
-                    if block.present >> lane & 1 == 1 {
-                        order.push(block.sample[lane]);
-                    }
-                }
+                assert!(block.at.as_flattened().iter().all(|at| at.abs() <= 1.0));
+                held.extend((0..16).filter(|lane| block.present >> lane & 1 == 1).map(|lane| block.sample[lane]));
             }
-            order.sort_unstable();
-            if !target.blocks.is_empty() {
-                assert_eq!(held, light.samples());
-                assert!(order.iter().enumerate().all(|(i, k)| i as u32 == *k));
-            }
+            held.sort_unstable();
+            assert!(target.blocks.is_empty() || held.into_iter().eq(0..light.samples() as u32));
         }
     }
 }

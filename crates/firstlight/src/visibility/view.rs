@@ -3,13 +3,15 @@
 use fearless_simd::{Level, Simd};
 
 use super::Viewpoint;
-use super::occluders::{MeshNumber, OccluderList, ShadowMesh};
+use super::occluders::OccluderList;
 use super::shaft::Shaft;
-use super::target::{LightSeen, Target};
+use super::target::Target;
 use crate::accel::{Aabb, dispatch_all};
-use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
-use crate::scene::{PlacedTarget, Scene};
-use crate::shape::{Cover, DiskShadow, Eye, ParallelogramShadow, Placement, SeenTriangle, SphereShadow, TOGETHER};
+use crate::math::{DVec3, ErrorBound, UNIT_ROUNDOFF, Vec3};
+use crate::scene::{PlacedTarget, Scene, ShadowMesh};
+use crate::shape::{
+    Cover, DiskShadow, Eye, LightSeen, ParallelogramShadow, Placement, SeenTriangle, SphereShadow, TOGETHER,
+};
 
 /// How much of a light is visible from a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,7 +86,7 @@ impl ShadowView {
             if shadow.is_below(point.horizon) {
                 continue;
             }
-            match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
+            match shadow.covers(&light) {
                 Cover::Nothing => {}
                 Cover::All => return Visibility::None,
                 Cover::Some => self.spheres.push(shadow),
@@ -95,7 +97,7 @@ impl ShadowView {
             if shadow.is_one_sided(*side) {
                 continue;
             }
-            match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
+            match shadow.covers(&light) {
                 Cover::Nothing => {}
                 Cover::All => return Visibility::None,
                 Cover::Some => self.flats.push(shadow),
@@ -103,7 +105,7 @@ impl ShadowView {
         }
         for disk in &occluders.disks {
             let shadow = scene.occluders.disks[*disk as usize].shape.shadow(point.p, point.error);
-            match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
+            match shadow.covers(&light) {
                 Cover::Nothing => {}
                 Cover::All => return Visibility::None,
                 Cover::Some => self.disks.push(shadow),
@@ -123,12 +125,8 @@ impl ShadowView {
             return Visibility::Partial;
         }
         self.gather_others(scene, target, &light, occluders, point);
-        let nothing = self.spheres.is_empty()
-            && self.flats.is_empty()
-            && self.disks.is_empty()
-            && self.triangles.is_empty()
-            && self.others.is_empty();
-        if nothing { Visibility::Full } else { Visibility::Partial }
+        let is_clear = self.spheres.is_empty() && self.flats.is_empty() && self.disks.is_empty() && !self.needs_mask();
+        if is_clear { Visibility::Full } else { Visibility::Partial }
     }
 
     /// Adds the solids and point sets whose boxes intersect the shaft of this point.
@@ -146,21 +144,14 @@ impl ShadowView {
         let shaft = Shaft::of(std::slice::from_ref(point), &[0], &target.hull);
         for &index in &occluders.others {
             let thing = &scene.geometry.placed[index as usize];
-            let bounds = match thing.target {
-                PlacedTarget::Solid(solid) => {
-                    let solid = &scene.geometry.solids[solid as usize];
-                    if let Some((on, n)) = solid.plane()
-                        && stays_before(&thing.placement, on, n, light, point)
-                    {
-                        continue;
-                    }
-                    solid.bounds()
-                }
-                PlacedTarget::Points(points) => scene.geometry.point_sets[points as usize].bounds(),
-                PlacedTarget::Mesh(_) => None,
-            };
+            if let PlacedTarget::Solid(solid) = thing.target
+                && let Some((on, n)) = scene.geometry.solids[solid as usize].plane()
+                && stays_before(&thing.placement, on, n, light, point)
+            {
+                continue;
+            }
             let mut around = Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY };
-            if let Some(bounds) = bounds {
+            if let Some(bounds) = scene.geometry.bounds_of(thing.target) {
                 let start = point.start.as_dvec3();
                 let [low, high] = thing.placement.bounds(bounds);
                 let far = (high - start).abs().max((low - start).abs()).max_element();
@@ -186,24 +177,17 @@ impl ShadowView {
         occluders: &OccluderList,
         point: &Viewpoint,
     ) -> bool {
-        let mut rest = &occluders.leaves[..];
         let mut leaves = std::mem::take(&mut self.leaves);
-        let mut hidden = false;
-        while let Some(&(source, _)) = rest.first() {
-            let count = rest.iter().take_while(|leaf| leaf.0 == source).count();
+        let is_hidden = occluders.leaves.chunk_by(|a, b| a.0 == b.0).any(|of_mesh| {
             leaves.clear();
-            leaves.extend(rest[..count].iter().map(|leaf| leaf.1));
-            rest = &rest[count..];
-            if let Some(mesh) = ShadowMesh::of(&scene.geometry, source, target.light) {
+            leaves.extend(of_mesh.iter().map(|leaf| leaf.1));
+            ShadowMesh::of(&scene.geometry, of_mesh[0].0, target.light).is_some_and(|mesh| {
                 let eye = eye(&mesh, light, point);
-                if classify_leaves(simd, &mesh, &eye, &leaves, source, point.but.of(source), &mut self.triangles) {
-                    hidden = true;
-                    break;
-                }
-            }
-        }
+                classify_leaves(simd, &mesh, &eye, &leaves, point.but.of(mesh.source), &mut self.triangles)
+            })
+        });
         self.leaves = leaves;
-        hidden
+        is_hidden
     }
 }
 
@@ -215,7 +199,6 @@ fn classify_leaves<S: Simd>(
     mesh: &ShadowMesh,
     eye: &Eye,
     leaves: &[u32],
-    source: MeshNumber,
     but: u32,
     seen: &mut Vec<SeenTriangle>,
 ) -> bool {
@@ -224,7 +207,7 @@ fn classify_leaves<S: Simd>(
         || {
             for four in leaves.chunks(TOGETHER) {
                 let casts = |triangle| triangle != but && mesh.casts(triangle);
-                if mesh.mesh.tree.look(simd, eye, four, source, &casts, seen) {
+                if mesh.mesh.tree.look(simd, eye, four, mesh.source, &casts, seen) {
                     return true;
                 }
             }
@@ -236,8 +219,7 @@ fn classify_leaves<S: Simd>(
 /// The point and the light in the object space of a mesh.
 fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
     // Rays end short of the light by the rounding of both ends: `ShadowRay::end`
-    let o = point.start.abs();
-    let o = o.x + o.y + o.z;
+    let o = point.start.abs().element_sum();
     let part = if light.plane == Vec3::ZERO {
         1.0 + o / light.shortest
     } else {
@@ -247,37 +229,25 @@ fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
     };
     let short = 32.0 * UNIT_ROUNDOFF * 1.01 * part + 8.0 * UNIT_ROUNDOFF;
     let short = if short < 0.5 { 1.0 / (1.0 - short) * (1.0 + 8.0 * UNIT_ROUNDOFF) } else { f32::INFINITY };
-    let own = Eye {
-        o: point.start,
-        error: point.error.0.as_dvec3(),
-        l: light.l,
-        axes: light.axes,
-        frame: light.frame,
-        radii: light.radii,
-        longest: light.longest,
-        shortest: light.shortest,
-        short,
-        finite: light.finite,
-        horizons: [point.horizon, point.ns],
-    };
+    let (error, horizons) = (point.error.0.as_dvec3(), [point.horizon, point.ns]);
+    let own = Eye { o: point.start, error, light: *light, short, horizons };
     let Some(placement) = mesh.placement else { return own };
     let m = &placement.object_from_world.matrix3;
     let way = |v: Vec3| (*m * v.as_dvec3()).as_vec3();
-    let size = |v: Vec3| {
-        let v = v.abs().as_dvec3();
-        m.x_axis.abs() * v.x + m.y_axis.abs() * v.y + m.z_axis.abs() * v.z
-    };
+    let size = |v: Vec3| placement.error_in_object(ErrorBound(v.abs()));
     let sizes: DVec3 = size(light.l) + size(light.axes[0]) + size(light.axes[1]) + size(light.axes[2]);
     let seen = LightSeen::new(way(light.l), light.axes.map(way), light.finite);
     let upright = placement.world_from_object.matrix3.transpose();
     Eye {
         o: placement.line(point.start, light.l).o.as_vec3(),
         error: placement.error_in_object(point.error),
-        l: seen.l,
-        axes: seen.axes,
-        frame: light.frame.map(way),
-        longest: (sizes.max_element() * 1.0001) as f32,
-        shortest: seen.shortest * 0.9999,
+        light: LightSeen {
+            frame: light.frame.map(way),
+            radii: light.radii,
+            longest: (sizes.max_element() * 1.0001) as f32,
+            shortest: seen.shortest * 0.9999,
+            ..seen
+        },
         horizons: own.horizons.map(|n| (upright * n.as_dvec3()).as_vec3()),
         ..own
     }
@@ -287,7 +257,7 @@ fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
 /// computed from the numbers that the intersection with the plane uses.
 fn stays_before(placement: &Placement, on: DVec3, n: DVec3, light: &LightSeen, point: &Viewpoint) -> bool {
     let height = n.dot(placement.line(point.start, light.l).o - on);
-    let across = placement.object_from_world.matrix3.transpose() * n;
+    let across = placement.normal(n);
     let reach: f64 = light.axes.iter().map(|a| across.dot(a.as_dvec3()).abs()).sum();
     let room = across.abs().element_sum() * f64::from(light.longest) * 1e-6;
     let middle = across.dot(light.l.as_dvec3()) * height.signum();
@@ -300,6 +270,5 @@ fn stays_before(placement: &Placement, on: DVec3, n: DVec3, light: &LightSeen, p
 #[inline(always)]
 fn is_below(light: &LightSeen, n: Vec3) -> bool {
     let (middle, reach) = light.range(n);
-    let size = n.abs();
-    middle + reach < -(size.x + size.y + size.z) * light.longest * DOT
+    middle + reach < -n.abs().element_sum() * light.longest * DOT
 }

@@ -1,3 +1,5 @@
+use firstlight_testkit::Random;
+
 use super::super::bounds::{EmissionProfile, ReceiverBounds};
 use super::super::{
     Falloff, Light, LightDesc, LightSample, PointDesc, RectangleDesc, SampleSet, SphereLightDesc, SpotDesc,
@@ -8,30 +10,8 @@ use crate::describe::{ColorDesc, SamplesDesc};
 use crate::material::{BlinnPhongLobe, PhongLobe};
 use crate::math::{Arc, DirectionCone};
 
-/// The same numbers for the same seed.
-struct Random(firstlight_testkit::Random);
-
-impl Random {
-    fn new(seed: u64) -> Self {
-        Random(firstlight_testkit::Random::new(seed))
-    }
-
-    fn next(&mut self) -> f64 {
-        self.0.unit()
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-
-    fn direction(&mut self) -> Vec3 {
-        loop {
-            let v = DVec3::new(self.between(-1.0, 1.0), self.between(-1.0, 1.0), self.between(-1.0, 1.0));
-            if v.length() > 0.1 && v.length() < 1.0 {
-                return v.normalize().as_vec3();
-            }
-        }
-    }
+fn direction(random: &mut Random) -> Vec3 {
+    DVec3::from(random.direction()).as_vec3()
 }
 
 fn compiled(desc: &LightDesc) -> Light {
@@ -44,12 +24,12 @@ fn compiled(desc: &LightDesc) -> Light {
 /// Some lights of one kind in a ball.
 fn lights(random: &mut Random, kind: u32, count: u32, size: f64) -> Vec<Light> {
     let falloff = if kind.is_multiple_of(2) { Falloff::Physical } else { Falloff::Constant };
-    let (front, wild) = (random.direction().as_dvec3(), random.between(0.0, 1.0));
+    let (front, wild) = (direction(random).as_dvec3(), random.between(0.0, 1.0));
     (0..count)
         .map(|_| {
-            let at = (random.direction().as_dvec3() * size * random.next()).to_array();
-            let color = ColorDesc::linear(random.next(), random.next(), random.next());
-            let aim = (front + random.direction().as_dvec3() * wild).normalize();
+            let at = (direction(random).as_dvec3() * size * random.unit()).to_array();
+            let color = ColorDesc::linear(random.unit(), random.unit(), random.unit());
+            let aim = (front + direction(random).as_dvec3() * wild).normalize();
             let reach = size * random.between(0.001, 0.2);
             let desc = match kind / 2 {
                 0 => LightDesc::Point(PointDesc { color, falloff, ..PointDesc::new(at) }),
@@ -79,7 +59,7 @@ fn lights(random: &mut Random, kind: u32, count: u32, size: f64) -> Vec<Light> {
 
 fn lobe(random: &mut Random) -> Lobe {
     let shininess = (random.between(0.0, 5.0) * random.between(0.0, 5.0) * random.between(1.0, 20.0)) as f32;
-    match (random.next() * 3.0) as u32 {
+    match (random.unit() * 3.0) as u32 {
         0 => Lobe::None,
         1 => Lobe::Phong(PhongLobe::new(shininess)),
         _ => Lobe::BlinnPhong(BlinnPhongLobe::new(shininess)),
@@ -112,29 +92,29 @@ fn truth(light: &Light, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> [[f64; 3]; 
     }
     let measure = area.filter(|area| area.physical).map_or(1.0, |area| area.shape.measure());
     let own = sums.map(|sum| sum * measure / f64::from(count));
-    own.map(|sum| channels(light.intensity).map(|c| f64::from(c) * sum))
+    own.map(|sum| light.intensity.to_array().map(|c| f64::from(c) * sum))
 }
 
 #[test]
 fn no_bound_is_broken() {
-    let mut random = Random::new(5);
+    let random = &mut Random::new(5);
     let (mut smooth, mut told) = (0, 0);
     for round in 0..600 {
         let kind = round % 8;
         let size = random.between(0.01, 1.0);
-        let some = 1 + (random.next() * 8.0) as u32;
-        let lights = lights(&mut random, kind, some, size);
+        let some = 1 + (random.unit() * 8.0) as u32;
+        let lights = lights(random, kind, some, size);
         let tree = LightTree::new(&lights, &vec![0; lights.len()]);
         // Receivers somewhere around
         let distance = random.between(0.3, 8.0) as f32;
-        let center = random.direction() * distance;
-        let n = random.direction();
+        let center = direction(random) * distance;
+        let n = direction(random);
         let n = if n.dot(center) > 0.0 { -n } else { n };
-        let reach = random.between(0.0, 0.3) as f32 * random.next() as f32;
-        let turn = random.between(0.0, 0.4) as f32 * random.next() as f32;
-        let wo = (n + random.direction() * 0.9).normalize();
+        let reach = random.between(0.0, 0.3) as f32 * random.unit() as f32;
+        let turn = random.between(0.0, 0.4) as f32 * random.unit() as f32;
+        let wo = (n + direction(random) * 0.9).normalize();
         let mirror = n * (2.0 * n.dot(wo)) - wo;
-        let lobe = lobe(&mut random);
+        let lobe = lobe(random);
         let cone = |axis: Vec3, chord: f32| DirectionCone { axis, angle: Arc::of_chord(chord) };
         let receivers = ReceiverBounds {
             center,
@@ -145,9 +125,9 @@ fn no_bound_is_broken() {
             lobe,
         };
         for _ in 0..4 {
-            let p = center + random.direction() * (reach * random.next() as f32);
-            let ns = (n + random.direction() * (turn * 0.4)).normalize();
-            let wo = (wo + random.direction() * (turn * 0.4)).normalize();
+            let p = center + direction(random) * (reach * random.unit() as f32);
+            let ns = (n + direction(random) * (turn * 0.4)).normalize();
+            let wo = (wo + direction(random) * (turn * 0.4)).normalize();
             if ns.dot(wo) <= 0.0 {
                 continue;
             }
@@ -168,7 +148,7 @@ fn no_bound_is_broken() {
                         *sum += one;
                     }
                 }
-                let flat = |sent: Colors| sent.0.map(|color| channels(color).map(f64::from));
+                let flat = |sent: Colors| sent.0.map(|color| color.to_array().map(f64::from));
                 let most = flat(node.max_contribution(&bounds));
                 for (sum, most) in sum.iter().flatten().zip(most.iter().flatten()) {
                     assert!(*sum <= most * 1.001 + 1e-12, "{round}: {sum} is more than {most}, {node:?}");
@@ -202,10 +182,10 @@ fn no_bound_is_broken() {
 
 #[test]
 fn lights_are_all_there_once() {
-    let mut random = Random::new(9);
+    let random = &mut Random::new(9);
     let mut all = Vec::new();
     for kind in 0..8 {
-        all.extend(lights(&mut random, kind, 50, 1.0));
+        all.extend(lights(random, kind, 50, 1.0));
     }
     let tree = LightTree::new(&all, &vec![0; all.len()]);
     let mut seen = vec![0; all.len()];
@@ -223,10 +203,10 @@ fn lights_are_all_there_once() {
 #[test]
 fn third_derivatives_are_bounded() {
     // Along all lines through points at distance 1, by differences in f64
-    let mut random = Random::new(3);
+    let random = &mut Random::new(3);
     let mut most = [0.0f64; 3];
     for _ in 0..20000 {
-        let [l, n, m, u] = [0; 4].map(|_| random.direction().as_dvec3());
+        let [l, n, m, u] = [0; 4].map(|_| direction(random).as_dvec3());
         let kernels: [&dyn Fn(DVec3) -> f64; 3] = [
             &|l| n.dot(l) / (l.length_squared() * l.length()),
             &|l| n.dot(l) * m.dot(l) / (l.length_squared() * l.length_squared()),

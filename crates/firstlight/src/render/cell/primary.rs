@@ -4,6 +4,7 @@
 use super::{CELL, Cells, Pixel, PixelState};
 use crate::film::hits::camera_ray;
 use crate::film::resolve::{LightTerm, PixelTerms};
+use crate::film::tile::Tile;
 use crate::material::{Bsdf, ShadingPoint};
 use crate::render::fragment::{Contrast, Member, RayHit};
 use crate::render::grid::Block;
@@ -77,24 +78,19 @@ impl Cells<'_> {
     fn trace_bundles(&mut self, Square { x, y, side }: Square, counts: &mut Counts) {
         let scene = self.scene;
         let step = self.hits.side().min(side);
-        let [right, bottom] = [(x + side).min(scene.width), (y + side).min(scene.height)];
-        for (top, left) in (y..bottom)
-            .step_by(step as usize)
-            .flat_map(|top| (x..right).step_by(step as usize).map(move |left| (top, left)))
-        {
-            let (w, h) = ((right - left).min(step), (bottom - top).min(step));
-            self.hits.trace(scene, left, top, w, h);
-            for (row, column) in (0..h).flat_map(|row| (0..w).map(move |column| (row, column))) {
-                self.sort_hits([left, top], [column, row], counts);
+        let (width, height) = (side.min(scene.width - x), side.min(scene.height - y));
+        for block in (Tile { x, y, width, height }).parts(step, 1) {
+            self.hits.trace(scene, block);
+            for at in block.pixels() {
+                self.sort_hits(at, counts);
             }
         }
     }
 
-    /// Sorts what the rays of a pixel meet, which was found together with its neighbours from `first` on.
-    fn sort_hits(&mut self, first: [u32; 2], [column, row]: [u32; 2], counts: &mut Counts) {
+    /// Sorts what the rays of a pixel meet, which was found together with its neighbours.
+    fn sort_hits(&mut self, [i, j]: [u32; 2], counts: &mut Counts) {
         let scene = self.scene;
         let n = scene.antialiasing;
-        let [i, j] = [first[0] + column, first[1] + row];
         let mut pixel = self.pixel([i, j], n * n, counts);
         let number = self.pixels.len() as u32;
         self.rays.clear();
@@ -102,7 +98,7 @@ impl Cells<'_> {
         let mut shapes = std::mem::take(&mut self.shapes);
         shapes.clear();
         for at in (0..n).flat_map(|y| (0..n).map(move |x| [x, y])) {
-            let Some(hit) = self.hits.get(column, row, at[0], at[1]) else {
+            let Some(hit) = self.hits.get([i, j], at[0], at[1]) else {
                 pixel.terms.background += 1;
                 continue;
             };

@@ -6,8 +6,8 @@ use crate::ids::LightId;
 use crate::material::ShadingPoint;
 use crate::math::{DVec3, Facet};
 use crate::render::Counts;
-use crate::scene::Scene;
-use crate::visibility::{ShadowMesh, ShadowView, Target, Viewpoint, Visibility};
+use crate::scene::{Scene, ShadowMesh};
+use crate::visibility::{ShadowView, Shaft, Target, Viewpoint, Visibility};
 
 /// The most leaves of triangles whose triangles are tested one by one.
 const LEAVES: usize = 12;
@@ -21,7 +21,8 @@ impl DirectLighting<'_> {
             return true;
         }
         let (target, trees, place) = (&lights.targets[index], &mut self.occluders, Viewpoint::of(point));
-        trees.gather_around(self.level, scene, target, &place, reach, turn > 0.0, LEAVES);
+        let shaft = Shaft::around(&place, reach, turn > 0.0, &target.hull);
+        trees.gather_in(self.level, scene, target, &shaft, LEAVES);
         trees.others.retain(|thing| !is_beside(scene, target, &place, reach, turn, *thing));
         // What does not rise over the one horizon of a flat footprint occludes nothing
         if reach > 0.0 && turn == 0.0 && place.but != Facet::NONE {
@@ -131,8 +132,7 @@ fn rises(scene: &Scene, place: &Viewpoint, source: u32, leaf: u32) -> bool {
     let Some(mesh) = ShadowMesh::of(&scene.geometry, source, LightId(0)) else { return true };
     mesh.mesh.tree.leaf(leaf).any(|(_, corners)| {
         corners.iter().any(|q| {
-            let q = mesh.placement.map_or(q.as_dvec3(), |at| at.world_from_object.transform_point3(q.as_dvec3()));
-            let way = q - place.p.as_dvec3();
+            let way = mesh.in_world(*q) - place.p.as_dvec3();
             let room = way.abs().max_element() * 1e-6 + f64::from(place.error.0.max_element());
             place.horizon.as_dvec3().dot(way) > room
         })

@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::patch::Patch;
 use super::receivers::{colors, receiver, receiver_bounds};
 use super::{BLOCK, BY_REPRESENTATIVE, LEVELS, MAX_SINGLE_LIGHTS, Many, PatchLight, SingleLight};
+use crate::accel::Aabb;
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::integrate::{COSTS, TOLERANCE};
@@ -56,7 +57,8 @@ impl<'a> Many<'a> {
             if !(receives && node.shadows) {
                 return Some(Visibility::Full);
             }
-            cluster_visibility.classify(simd, scene, node.bounds.low, node.bounds.high, LightId(light))
+            let around = Aabb { min: node.bounds.low, max: node.bounds.high };
+            cluster_visibility.classify(simd, scene, around, LightId(light))
         };
         let links = scene.geometry.lights_of(patch(&group[0]).point.surface);
         let shines = |root: &&u32| {

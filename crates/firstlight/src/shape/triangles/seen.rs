@@ -50,6 +50,7 @@ use super::kernel::{intersect, intersect_lanes};
 use super::{CORNER_ROUNDING, NONE, PACK, Pack, TriangleTree, along, bits, is_in_plane};
 use crate::accel::{RayPacket16, Slabs, groups};
 use crate::math::{DVec3, UNIT_ROUNDOFF as H, Vec3};
+use crate::shape::cover::LightSeen;
 
 /// By how much U, V and W can be wrong, in D s L.
 const EDGE: f32 = 192.0 * H;
@@ -84,24 +85,12 @@ pub(crate) struct Eye {
     pub o: Vec3,
     /// How far the point that they leave may be wrong.
     pub error: DVec3,
-    /// To the light's middle.
-    pub l: Vec3,
-    /// Half the light, along its axes.
-    pub axes: [Vec3; 3],
-    /// Along which triangles are bounded: two across, and the third.
-    pub frame: [Vec3; 3],
-    /// How far away a ball is, in radii: what is bounded then are ways in the plane through its middle.
-    pub radii: Option<f32>,
-    /// The largest coordinate of any way, at least; in another space also the sum of the sizes of what it was computed
-    /// from.
-    pub longest: f32,
-    /// The largest coordinate of every way, at most.
-    pub shortest: f32,
+    /// The light; in another space than the world's, its `longest` is also at least the sum of the sizes of what it was
+    /// computed from.
+    pub light: LightSeen,
     /// How much shorter than 1 the rays are, at most; without bound where nothing is known. 1 or more: they may be of
     /// any length.
     pub short: f32,
-    /// Whether the rays have an end.
-    pub finite: bool,
     /// Ways that are not above both do not count.
     pub horizons: [Vec3; 2],
 }
@@ -117,14 +106,15 @@ impl<S: Simd> ShadowBounds<S> {
     /// `sound`.
     #[inline(always)]
     fn new(simd: S, eye: &Eye, vertices: [V<S>; 3], far_off: f32x16<S>, sound: mask32x16<S>) -> Self {
-        let [a, b, c] = eye.frame;
+        let [a, b, c] = eye.light.frame;
         let normal = b.cross(a);
         let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
         let infinite = simd.splat_f32x16(f32::INFINITY);
         // Whether all of the light is on one side of o, and on which
-        let (ahead, depth) = (normal.dot(eye.l), normal.dot(c).abs());
-        let size = a.abs().max(b.abs()).max_element() * eye.longest;
-        let is_apart = ahead.abs() - depth > EDGE * size * eye.longest && eye.radii.is_none_or(|radii| radii > APART);
+        let (ahead, depth) = (normal.dot(eye.light.l), normal.dot(c).abs());
+        let size = a.abs().max(b.abs()).max_element() * eye.light.longest;
+        let is_apart =
+            ahead.abs() - depth > EDGE * size * eye.light.longest && eye.light.radii.is_none_or(|radii| radii > APART);
         let side = if ahead < 0.0 { -1.0 } else { 1.0 };
         let wrong = far_off * (2.0 * EDGE * size);
         let mut is_ahead = sound & mask32x16::splat(simd, is_apart);
@@ -134,8 +124,8 @@ impl<S: Simd> ShadowBounds<S> {
             is_ahead &= across.simd_gt(wrong);
             let inverse = one / is_ahead.select(across, one);
             for (axis, (along, turned)) in [(b, -side), (a, side)].into_iter().enumerate() {
-                let middle = dot(x, along.cross(eye.l)) * inverse * turned;
-                let reach = if eye.radii.is_some() { zero } else { (dot(x, along.cross(c)) * inverse).abs() };
+                let middle = dot(x, along.cross(eye.light.l)) * inverse * turned;
+                let reach = if eye.light.radii.is_some() { zero } else { (dot(x, along.cross(c)) * inverse).abs() };
                 let room = reach + wrong * inverse * (middle.abs() + reach + 2.0);
                 bounds.low[axis] = bounds.low[axis].min(middle - room);
                 bounds.high[axis] = bounds.high[axis].max(middle + room);
@@ -153,7 +143,7 @@ impl<S: Simd> ShadowBounds<S> {
     fn beside(&self, eye: &Eye) -> mask32x16<S> {
         let ([u, v], [to_u, to_v]) = (self.low, self.high);
         // Where the cone that holds a ball meets that plane
-        let rim = eye.radii.map_or(1.0, |radii| radii / (radii * radii - 1.0).max(0.0).sqrt() * (1.0 + 1e-3));
+        let rim = eye.light.radii.map_or(1.0, |radii| radii / (radii * radii - 1.0).max(0.0).sqrt() * (1.0 + 1e-3));
         u.max(v).simd_gt(rim) | to_u.min(to_v).simd_lt(-rim)
     }
 }
@@ -281,7 +271,8 @@ impl<S: Simd> LinearWay<S> {
     /// f.l, with the other sign for those in `behind`.
     #[inline(always)]
     fn new(f: V<S>, eye: &Eye, behind: mask32x16<S>) -> Self {
-        let (m, a, b, c) = (dot(f, eye.l), dot(f, eye.axes[0]), dot(f, eye.axes[1]), dot(f, eye.axes[2]));
+        let (m, a, b, c) =
+            (dot(f, eye.light.l), dot(f, eye.light.axes[0]), dot(f, eye.light.axes[1]), dot(f, eye.light.axes[2]));
         LinearWay { middle: behind.select(-m, m), slopes: [a, b, c], reach: a.abs() + b.abs() + c.abs() }
     }
 
@@ -342,7 +333,7 @@ impl TriangleTree {
         let d = LinearWay::new(n, eye, behind);
         // How far each can be wrong
         let (side2, side3) = (side * side, side * side * side);
-        let longest = simd.splat_f32x16(eye.longest);
+        let longest = simd.splat_f32x16(eye.light.longest);
         let edge = far_off * side * longest * EDGE;
         let det_wrong = side2 * longest * TURN;
         let wrong = area * far_off * DEPTH + far_off * side2 * HEIGHT;
@@ -362,8 +353,8 @@ impl TriangleTree {
         let ahead = least.simd_gt(det_wrong);
         let away = most.simd_lt(zero) & ((height - wrong) * -most).simd_gt(area * longest * sliver);
         let mut nothing = (outside & (inside_one | large | ahead)) | away;
-        if eye.finite {
-            let ratio = eye.longest / eye.shortest * GRAZE_ALL;
+        if eye.light.finite {
+            let ratio = eye.light.longest / eye.light.shortest * GRAZE_ALL;
             let room = area * (far_off * ratio) + sliver * (1.0 / GRAZE_ALL) + wrong + det_wrong;
             nothing |= (most + room).simd_lt(height) & height.simd_gt(room);
         }
@@ -378,8 +369,8 @@ impl TriangleTree {
             return false;
         }
         // How far a ray leads, up to where a triangle is
-        let led = far_off * (eye.longest / eye.shortest);
-        let led = if eye.finite { led.min(eye.longest) } else { led };
+        let led = far_off * (eye.light.longest / eye.light.shortest);
+        let led = if eye.light.finite { led.min(eye.light.longest) } else { led };
         for horizon in eye.horizons {
             let highest = dot(a, horizon).max(dot(b, horizon)).max(dot(c, horizon));
             let room = (far_off + led) * (BELOW * horizon.abs().element_sum());
@@ -403,10 +394,10 @@ impl TriangleTree {
         }
         // Those that hide something: for sure where det is above `near`, for sure not where it is below `far`
         let middling = height.simd_gt(wrong + sliver * (1.0 / GRAZE)) & sound;
-        let before = if eye.finite { (height + wrong + sliver * (1.0 / GRAZE)) * eye.short } else { zero };
+        let before = if eye.light.finite { (height + wrong + sliver * (1.0 / GRAZE)) * eye.short } else { zero };
         let infinite = simd.splat_f32x16(f32::INFINITY);
         let near = middling.select(before.max(graze) + det_wrong, infinite);
-        let far = if eye.finite { height - area * (side * 3.0) - wrong - det_wrong } else { -infinite };
+        let far = if eye.light.finite { height - area * (side * 3.0) - wrong - det_wrong } else { -infinite };
         let far = (large & sound).select(far, -infinite);
         let graze = large.select(-infinite, middling.select(graze + det_wrong, infinite));
         let graze = sound.select(graze, infinite);
