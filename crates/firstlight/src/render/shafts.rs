@@ -1,8 +1,7 @@
-//! The fast renderer's way through a tile: what may stand before a light is gathered once for neighbouring points.
+//! Sampled light by shafts: the occluders of a light are gathered once for neighbouring points.
 //!
-//! The camera rays of a block of pixels first, then light by light: the points of the block that need it are taken
-//! together, and a [`VisibilityResolver`] finds from which of them the light is lit, hidden, below the horizon, or cut
-//! ([`Sampled`]).
+//! The camera rays of a block of pixels are traced first. Then, light by light, a [`VisibilityResolver`] classifies the
+//! visibility of the light from all points of the block together ([`Sampled`]).
 
 use std::ops::ControlFlow;
 
@@ -63,7 +62,7 @@ impl<'a> Shafts<'a> {
                 let pixels = &mut pixels[..(w * h) as usize];
                 let before = counts.work();
                 self.block([tile.x + left, tile.y + top], [w, h], pixels, &mut counts, go_on)?;
-                // What is settled for all points of the block together is shared
+                // The work for all points of the block together is divided among its pixels
                 let work = rays + (counts.work() - before) / pixels.len() as f32;
                 for (i, (pixel, _)) in pixels.iter().enumerate() {
                     let (x, y) = (i as u32 % w, i as u32 / w);
@@ -96,7 +95,7 @@ impl<'a> Shafts<'a> {
             for row in 0..n {
                 for column in 0..n {
                     counts.camera_rays += 1;
-                    // Found anew: to keep a ray costs more than to find it
+                    // Computed again: storing a ray takes longer
                     let (ray, differential) = camera_ray(scene, (i + x) * n + column, (j + y) * n + row);
                     let hit = self.hits.get(x, y, column, row);
                     if let Some(point) = pixel.see(scene, scene.see(&ray, hit, &differential)) {
@@ -130,7 +129,7 @@ impl<'a> Shafts<'a> {
         let (surfaces, sums) = (&self.surfaces, &mut self.sums);
         sums.clear();
         sums.resize(surfaces.len(), Moments::ZERO);
-        // Those that nothing can shadow
+        // Points that nothing can shadow
         self.order.clear();
         for (k, point) in surfaces.iter().enumerate() {
             if !shines_on(scene, index, point) {
@@ -142,14 +141,14 @@ impl<'a> Shafts<'a> {
                 sums[k] = light.unshadowed(point, counts);
             }
         }
-        // The others in parts that are not too long for someone who waits
+        // The others in parts, between which a render can be stopped
         let at_once = (QUESTION_EVERY / light.samples()).clamp(1, 1 << 20) as usize;
         for part in self.order.chunks_mut(at_once) {
             if counts.shadow_rays >= counts.next_question {
                 counts.next_question = counts.shadow_rays + QUESTION_EVERY;
                 go_on()?;
             }
-            light.settle(&mut self.resolver, &self.points, part, counts, |k, visibility, view| {
+            light.classify(&mut self.resolver, &self.points, part, counts, |k, visibility, view| {
                 sums[k] = light.sent(&surfaces[k], visibility, view);
             });
         }

@@ -1,4 +1,4 @@
-//! What of the BVHs may occlude a light, seen from points: gathered in the shaft between them.
+//! Occluders in BVHs: gathered in the shaft between points and a light.
 
 use arrayvec::ArrayVec;
 
@@ -11,14 +11,14 @@ use crate::render::Counts;
 use crate::scene::Scene;
 use crate::visibility::{ShadowMesh, ShadowView, Shaft, Target, Viewpoint, Visibility};
 
-/// The most triangles that a light is evaluated past, seen from one ray.
+/// The most triangles behind which a light is integrated; with more it is sampled.
 const FEW_TRIANGLES: usize = 6;
-/// The most leaves of triangles whose triangles are tested one by one.
+/// The most leaves whose triangles are tested one by one.
 const LEAVES: usize = 12;
 
 impl DirectLighting<'_> {
-    /// Gathers what of the BVHs may occlude a light for the first of some queries, and for those after it that are for
-    /// points of one surface. Returns the visibility and the number of queries that share it.
+    /// Gathers the occluders in BVHs for the first of some queries, and for those after it whose points are on its
+    /// surface. Returns the visibility and the number of queries that share it.
     pub(super) fn gather_run(&mut self, of: &Group, members: &[u32]) -> (Visibility, usize) {
         let first = of.point(members[0]);
         let is_like = |k: &&u32| {
@@ -39,7 +39,7 @@ impl DirectLighting<'_> {
         }
     }
 
-    /// Gathers what of the BVHs may occlude a light: from one point and its footprint; or from several points.
+    /// Gathers the occluders in BVHs between a light and one point with its footprint, or several points.
     fn gather(
         &mut self,
         index: usize,
@@ -55,7 +55,7 @@ impl DirectLighting<'_> {
             [point] => {
                 trees.gather_around(self.level, scene, target, point, reach, turn > 0.0, LEAVES);
                 trees.others.retain(|thing| !is_beside(scene, target, point, reach, turn, *thing));
-                // What does not rise over the one horizon of a flat footprint occludes nothing
+                // Below the horizon of a flat footprint nothing is an occluder
                 if reach > 0.0 && turn == 0.0 && point.but != Facet::NONE {
                     trees.leaves.retain(|(source, leaf)| rises(scene, point, *source, *leaf));
                 }
@@ -81,12 +81,12 @@ impl DirectLighting<'_> {
         }
     }
 
-    /// Whether a light of one point is occluded by nothing in the BVHs, from all of a footprint.
+    /// Whether nothing in BVHs occludes a light of one point, from all of a footprint.
     pub(super) fn is_unoccluded_by_trees(&mut self, index: usize, point: &ShadingPoint) -> bool {
         self.gather(index, &[Viewpoint::of(point)], point) == Visibility::Listed
     }
 
-    /// What may occlude light `index` from all of some points together, by one shaft.
+    /// The visibility of light `index` from all of some points together, by one shaft.
     pub fn gather_for(&mut self, index: usize, points: &[Viewpoint], counts: &mut Counts) -> Visibility {
         self.indices.clear();
         self.indices.extend(0..points.len() as u32);
@@ -104,7 +104,7 @@ impl DirectLighting<'_> {
     }
 
     /// Classifies the visibility of light `index` from each of those `points` whose numbers are in `order`. `each` gets
-    /// the point's number, its visibility, and, where the light has no closed form, the view that it is sampled by.
+    /// the point's number, the visibility, and, where the light has no closed form, the occluders for sampling.
     pub fn classify(
         &mut self,
         index: usize,
@@ -134,7 +134,7 @@ impl DirectLighting<'_> {
         });
     }
 
-    /// What may occlude light `index`, seen from one point; `None` if it is not visible.
+    /// The occluders of light `index`, seen from one point; `None` if it is not visible.
     pub fn classify_one(&mut self, index: usize, point: &ShadingPoint, counts: &mut Counts) -> Option<ShadowView> {
         let mut kept = self.views.pop().unwrap_or_default();
         if !(self.scene.lights[index].shadows && point.receives_shadow) {
