@@ -16,7 +16,7 @@ use crate::material::{Colors, MOMENTS};
 use crate::visibility::Visibility;
 
 /// Bounds of the colours of the receivers.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ReceiverColors {
     /// A lower bound of the radiance without the lights.
     pub base: Rgb,
@@ -38,16 +38,12 @@ pub(super) struct CutRules<'a> {
 }
 
 /// How the contribution of a node is estimated at all receivers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum NodeEstimator {
-    /// By its centroid; nothing occludes it.
-    Centroid,
-    /// By its centroid, where its representative light is visible.
-    CentroidIfVisible,
-    /// By its representative light; nothing occludes it.
-    Representative,
-    /// By its representative light, where that is visible.
-    RepresentativeIfVisible,
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NodeEstimator {
+    /// By its centroid, or else by its representative light.
+    pub by_centroid: bool,
+    /// Nothing occludes the node, or else it contributes where its representative light is visible.
+    pub is_unoccluded: bool,
 }
 
 /// A node of the cut.
@@ -118,13 +114,6 @@ fn color([r, g, b]: [f64; 3]) -> Rgb {
     Rgb::new(r.max(0.0) as f32, g.max(0.0) as f32, b.max(0.0) as f32)
 }
 
-impl NodeEstimator {
-    /// Whether the node is known to be fully visible from all receivers.
-    pub fn is_unoccluded(self) -> bool {
-        matches!(self, NodeEstimator::Centroid | NodeEstimator::Representative)
-    }
-}
-
 impl CutRules<'_> {
     fn key(&self, error: &Colors) -> f32 {
         self.colors.iter().fold(0.0, |key, colors| {
@@ -165,34 +154,29 @@ impl CutItem {
     /// A node with its estimator; `lit` if it is known to be fully visible.
     fn new(rules: &CutRules, index: u32, bounds: ContributionBounds, lit: bool) -> CutItem {
         let node = &rules.tree.nodes[index as usize];
-        let estimator = match (lit, bounds.is_smooth) {
-            (true, true) => NodeEstimator::Centroid,
-            (true, false) => NodeEstimator::Representative,
-            (false, true) => NodeEstimator::CentroidIfVisible,
-            (false, false) => NodeEstimator::RepresentativeIfVisible,
-        };
-        let error = match (estimator, node.contents) {
-            (NodeEstimator::Centroid, _) => node.error(&bounds),
+        let estimator = NodeEstimator { by_centroid: bounds.is_smooth, is_unoccluded: lit };
+        let error = match node.contents {
+            _ if lit && bounds.is_smooth => node.error(&bounds),
             // Evaluated at each receiver, it has no error
-            (_, NodeContents::Light(_)) if node.is_point() => Colors::default(),
+            NodeContents::Light(_) if node.is_point() => Colors::default(),
             // The standard deviation of a number between 0 and the maximum is at most half of the maximum
             _ => node.max_contribution(&bounds) * 0.5,
         };
-        let part = if estimator.is_unoccluded() { 1.0 } else { COSTS.maybe };
+        let part = if lit { 1.0 } else { COSTS.maybe };
         let typical = part * 0.5 * (bounds.min_diffuse + bounds.max_diffuse.min(1e3 * bounds.min_diffuse));
         CutItem { node: index, estimator, error, key: rules.key(&error), typical, is_classified: lit, bounds }
     }
 
     /// The item as a fully visible one, if its centroid estimates it then.
     fn as_centroid(&self, rules: &CutRules) -> Option<CutItem> {
-        (self.estimator == NodeEstimator::CentroidIfVisible).then(|| CutItem::new(rules, self.node, self.bounds, true))
+        let NodeEstimator { by_centroid, is_unoccluded } = self.estimator;
+        (by_centroid && !is_unoccluded).then(|| CutItem::new(rules, self.node, self.bounds, true))
     }
 
     /// Whether a classification of its visibility is likely to save more time than it takes.
     fn is_worth_classifying(&self, rules: &CutRules, node: &LightNode) -> bool {
         self.bounds.sin_half_angle < COSTS.wide
-            || self.estimator == NodeEstimator::CentroidIfVisible
-                && rules.key(&node.error(&self.bounds)) <= COSTS.looked_at * self.key
+            || self.estimator.by_centroid && rules.key(&node.error(&self.bounds)) <= COSTS.looked_at * self.key
     }
 }
 
@@ -275,13 +259,12 @@ impl Cut {
 
     /// Splits the node with the largest error bound, again and again, until the error of the cut is at most
     /// `rules.budget` display steps. The display steps depend on the incident light: `guess`, or else the sum over the
-    /// nodes of the cut. `classify` returns the visibility of a node, if it can be proved; its second argument is one
-    /// of the node's lights.
+    /// nodes of the cut. `classify` returns the visibility of a node, if it can be proved.
     pub fn refine(
         &mut self,
         rules: &CutRules,
         guess: Option<Rgb>,
-        classify: &mut dyn FnMut(&LightNode, u32) -> Option<Visibility>,
+        classify: &mut dyn FnMut(&LightNode) -> Option<Visibility>,
     ) {
         self.guess = guess;
         let mut counted = f32::INFINITY;
@@ -291,9 +274,9 @@ impl Cut {
             }
             let Some(item) = self.pop(rules) else { break };
             let node = rules.node(&item);
-            let mut lit = item.estimator.is_unoccluded();
+            let mut lit = item.estimator.is_unoccluded;
             if !lit && !item.is_classified && item.is_worth_classifying(rules, node) {
-                match classify(node, node.first(rules.tree)) {
+                match classify(node) {
                     Some(Visibility::None) => continue,
                     Some(Visibility::Full) => {
                         lit = true;
@@ -325,22 +308,22 @@ impl Cut {
         &mut self,
         rules: &CutRules,
         receivers: usize,
-        classify: &mut dyn FnMut(&LightNode, u32) -> Option<Visibility>,
+        classify: &mut dyn FnMut(&LightNode) -> Option<Visibility>,
     ) {
         self.nodes.clear();
         for place in std::mem::take(&mut self.heap) {
             let mut item = self.items[at(place)];
             let node = rules.node(&item);
-            if !item.estimator.is_unoccluded() && !item.is_classified && receivers >= FEW_RECEIVERS {
-                let visibility = classify(node, node.first(rules.tree));
+            if !item.estimator.is_unoccluded && !item.is_classified && receivers >= FEW_RECEIVERS {
+                let visibility = classify(node);
                 if visibility == Some(Visibility::None) {
                     self.count(rules, &item, -1.0);
                     continue;
                 }
                 if visibility == Some(Visibility::Full) {
                     self.count(rules, &item, -1.0);
-                    item =
-                        item.as_centroid(rules).unwrap_or(CutItem { estimator: NodeEstimator::Representative, ..item });
+                    let unoccluded = NodeEstimator { is_unoccluded: true, ..item.estimator };
+                    item = item.as_centroid(rules).unwrap_or(CutItem { estimator: unoccluded, ..item });
                     self.count(rules, &item, 1.0);
                 }
             }

@@ -34,25 +34,25 @@ pub(crate) struct LightQuery {
     /// The number of the point among those of the call.
     pub point: u32,
     pub light: u32,
-    /// What is known of how much of it is seen from all of the footprint.
+    /// What is known of its visibility from all of the footprint.
     pub visibility: Visibility,
 }
 
 /// What one light sends to a shading point, and how much that varies over the point's footprint.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightEstimate {
-    /// At the point; not a number where the light has to be sampled, or where it varies too much.
+    /// At the point; not a number where the light has to be sampled, or varies too much over the footprint.
     pub moments: Moments,
-    /// Whether all of the light, or nothing, is seen from all of the footprint.
+    /// Whether the light is fully visible, or invisible, from all of the footprint.
     pub is_uniform: bool,
-    /// How far silhouettes move on the light over the footprint, as a part of its size.
+    /// The motion of silhouettes on the light over the footprint, as a part of the light's size.
     pub motion: f32,
-    /// By how many radians the light's direction, and the normal under it, turn over the footprint, times the square
-    /// root of the lobe's exponent; infinite near the light or its plane.
+    /// In radians: the rotation of the light's direction against the normal over the footprint, times the square root
+    /// of the lobe's exponent; infinite near the light or its plane.
     pub turn: f32,
-    /// About the largest moment the light can have here: its measure over the squared distance.
+    /// The approximate maximum of a moment of the light here: its measure over the squared distance.
     pub most: f32,
-    /// What is known by now of how much of it is seen from all of the footprint.
+    /// What is known by now of its visibility from all of the footprint.
     pub visibility: Visibility,
 }
 
@@ -72,24 +72,23 @@ impl LightEstimate {
         is_uniform: false,
         motion: f32::INFINITY,
         turn: f32::INFINITY,
-        most: 0.0,
-        visibility: Visibility::Partial,
+        ..LightEstimate::NOTHING
     };
 
-    /// How far the mean over the footprint may be from the value at the point because the light turns, as a part of
-    /// [`most`](Self::most).
+    /// The difference between the mean over the footprint and the value at the point by the rotation of the light, as
+    /// a part of [`most`](Self::most).
     pub fn turned(&self) -> f32 {
         0.5 * self.turn * self.turn
     }
 
-    /// The same because the light comes out from behind a silhouette, or above the horizon: the visible fraction begins
-    /// to grow at once, over an eighth of the way that the silhouette or the light moves.
+    /// The same by a discontinuous derivative of the visible fraction, where a silhouette or the horizon leaves the
+    /// light: an eighth of the motion.
     pub fn kink(&self) -> f32 {
         let moved = if self.is_uniform { self.motion } else { self.motion.max(self.turn) };
         if self.moments.cosine() > moved * self.most { 0.0 } else { 0.125 * moved }
     }
 
-    /// How far the mean of a moment over the footprint may be from its value at the point.
+    /// The difference between the mean of a moment over the footprint and its value at the point.
     pub fn bend(&self) -> f32 {
         if self.turn == f32::INFINITY { f32::MAX } else { (self.turned() + self.kink()).min(1.0) * self.most }
     }
@@ -122,13 +121,13 @@ pub(crate) struct DirectLighting<'a> {
     pub(super) lights: &'a Lights<'a>,
     pub(super) level: Level,
     pub(super) evaluator: AreaLightIntegrator,
-    /// In display steps: how far one light may be wrong at a point.
+    /// In display steps: the allowed error of one light at a point.
     allowed: f32,
     /// The numbers of queries, by kind of lobe, light, and whether occluders count.
     order: Vec<(GroupKey, u32)>,
     points: Vec<ShadingPoint>,
     integrals: Vec<LightIntegral>,
-    /// Of a group: those whose light listed shapes alone may occlude.
+    /// Of a group: the queries whose light only listed shapes may occlude.
     listed: Vec<u32>,
     pub(super) occluders: OccluderList,
     pub(super) resolver: VisibilityResolver,
@@ -166,27 +165,27 @@ impl<'a> DirectLighting<'a> {
         self.level
     }
 
-    /// How errors show.
+    /// The display curve, by which errors are weighed.
     pub fn display_steps(&self) -> &'a DisplaySteps {
         &self.lights.steps
     }
 
-    /// Sets how many display steps each light may be wrong by from now on.
+    /// Sets the allowed error of each light, in display steps.
     pub fn tolerate(&mut self, allowed: f32) {
         self.allowed = allowed;
     }
 
-    /// How many display steps a value can be off by an error.
+    /// The display steps between a value and the same value less an error.
     pub fn steps(&self, value: Rgb, error: Rgb) -> f32 {
         self.lights.steps.of_color(value, error)
     }
 
-    /// What the moments of light `index` are multiplied with, before the colours of the surface.
+    /// The factor of the moments of light `index`, before the colours of the surface.
     pub fn scale(&self, index: usize) -> Rgb {
         self.lights.scales[index]
     }
 
-    /// The same of all lights.
+    /// The same for all lights.
     pub fn scales(&self) -> &'a [Rgb] {
         &self.lights.scales
     }
@@ -201,20 +200,20 @@ impl<'a> DirectLighting<'a> {
         self.lights.emitters[index].is_some()
     }
 
-    /// Whether a light is integrated and can be occluded: then it is sampled behind what is in BVHs.
+    /// Whether a light is integrated and casts shadows: then it is sampled behind occluders in BVHs.
     pub fn is_behind(&self, index: usize) -> bool {
         self.is_integrated(index) && self.scene.lights[index].shadows
     }
 
-    /// Whether the visibility of light `index` is to be found for all rays of a block of pixels together: not of area
-    /// lights that are sampled at fixed points.
+    /// Whether the visibility of light `index` is classified for all rays of a block of pixels together: not that of
+    /// area lights that are sampled at fixed points.
     pub fn is_classified_by_blocks(&self, index: usize) -> bool {
         let light = &self.scene.lights[index];
         light.area().is_none() || light.is_integrated()
     }
 
-    /// In display steps: how far one light may be wrong at a point that represents such a share of a pixel, where the
-    /// errors of neighbours are as good as independent.
+    /// In display steps: the allowed error of one light at a point that represents such a share of a pixel, where the
+    /// errors of neighbours are nearly independent.
     pub fn tolerance_by_chance(&self, share: f32) -> f32 {
         self.allowed * TOLERANCE.by_chance / share.max(TOLERANCE.least_share).sqrt()
     }
@@ -265,7 +264,7 @@ impl<'a> DirectLighting<'a> {
         };
     }
 
-    /// Estimates each query, in place of what was in `estimates`. `go_on` is called now and then.
+    /// Replaces `estimates` by the estimate of each query. `go_on` is called between groups and batches.
     pub fn estimate(
         &mut self,
         points: &[ShadingPoint],
@@ -277,7 +276,7 @@ impl<'a> DirectLighting<'a> {
         let scene = self.scene;
         estimates.clear();
         estimates.resize(queries.len(), LightEstimate::NOTHING);
-        // Sort them by kind of lobe, light and shadows
+        // Sort the queries by kind of lobe, light and shadows
         let mut order = std::mem::take(&mut self.order);
         order.clear();
         for (k, query) in queries.iter().enumerate() {
@@ -323,8 +322,8 @@ impl<'a> DirectLighting<'a> {
         ControlFlow::Continue(())
     }
 
-    /// Evaluates an area light at some points of a group, past what may occlude it: what it sends if it is integrated,
-    /// and how it varies over the footprints.
+    /// Evaluates an area light at some points of a group, past its occluders: its moments if it is integrated, and its
+    /// variation over the footprints.
     fn evaluate(
         &mut self,
         of: &Group,
@@ -363,7 +362,7 @@ impl<'a> DirectLighting<'a> {
         ControlFlow::Continue(())
     }
 
-    /// The same for up to any number of points, past what is known to occlude the light.
+    /// The same for any number of points, past known occluders.
     fn batch(
         &mut self,
         of: &Group,
@@ -382,8 +381,8 @@ impl<'a> DirectLighting<'a> {
         }
     }
 
-    /// Notes that a light has to be sampled at a point. If its value is wanted whatever silhouettes do over the
-    /// footprint, so is a bound of what it can send.
+    /// Notes that a light has to be sampled at a point. If its value is needed whatever the motion of silhouettes over
+    /// the footprint, its rotation and its maximum are estimated.
     fn unknown(&mut self, of: &Group, k: u32, estimates: &mut [LightEstimate], counts: &mut Counts) {
         let point = of.point(k);
         estimates[k as usize] = LightEstimate::UNKNOWN;
@@ -394,7 +393,7 @@ impl<'a> DirectLighting<'a> {
         }
     }
 
-    /// Evaluates an area light at some points of a group: its sums only if they are wanted.
+    /// Evaluates an area light at some points of a group: its moments only with `sums`.
     fn arrive(&mut self, of: &Group, visibility: Visibility, sums: bool, members: &[u32], counts: &mut Counts) {
         counts.batches += members.len().div_ceil(LANES) as u64;
         counts.batched_points += members.len() as u64;
@@ -407,7 +406,7 @@ impl<'a> DirectLighting<'a> {
         self.evaluator.evaluate(self.level, &task, &self.points, &mut self.integrals);
     }
 
-    /// What a light sends to a point, and how it varies over the footprint.
+    /// The estimate of an integrated light: its moments and its variation over the footprint.
     fn variation(&self, of: &Group, k: u32, integral: &LightIntegral) -> LightEstimate {
         let LightIntegral { sums, visibility, proved, motion, distance, height } = *integral;
         let (light, point) = (&self.scene.lights[of.light], of.point(k));
@@ -421,7 +420,7 @@ impl<'a> DirectLighting<'a> {
         LightEstimate { moments: sums, is_uniform: proved, motion, turn, most, visibility: Visibility::Partial }
     }
 
-    /// Area light `index`, as it is sampled.
+    /// The samples of area light `index`.
     pub fn sampler(&self, index: usize) -> LightSampler<'a> {
         let (scene, level) = (self.scene, self.level);
         let area = scene.lights[index].area().expect("lights that are integrated have an area");
@@ -430,7 +429,7 @@ impl<'a> DirectLighting<'a> {
         LightSampler { scene, level, area, emitter, target, sets }
     }
 
-    /// By how many radians directions turn over the footprint of a point, times how narrow its lobe is.
+    /// In radians: the rotation of directions over the footprint of a point, times the inverse of the width of its lobe.
     pub(super) fn turn(&self, point: &ShadingPoint, distance: f32) -> f32 {
         if point.reach == 0.0 {
             return 0.0;

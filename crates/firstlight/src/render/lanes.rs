@@ -1,8 +1,8 @@
-//! The fast renderer: sixteen light samples at once, and only the shapes that can stand in the way.
+//! Sampled light in lanes: sixteen light samples at once, past the shapes that may occlude the light.
 //!
 //! The same numbers as [`Plain`](super::plain::Plain), operation by operation. A shape is left out where it is proved
-//! that it could not have answered "blocked": a flat one that has the point and all of the light on one side of its
-//! plane, the sphere the point itself lies on the outside of, a sphere that is wholly below the point's horizon.
+//! to occlude nothing: a flat one that has the point and all of the light on one side of its plane, the sphere whose
+//! outside the point lies on, a sphere that is wholly below the point's horizon.
 
 use fearless_simd::{Level, f32x16, mask32x16, prelude::*};
 
@@ -15,24 +15,23 @@ use crate::ids::LightId;
 use crate::light::{Area, MIN_DISTANCE2, Points};
 use crate::material::{LobeLanes, MOMENTS, ShadingPoint};
 use crate::math::{LANES, LaneSum, LightEnd, ShadowRay, Vec3, Vec3x16};
-use crate::scene::{Geometry, Listed, Opacity, Scene, ShadowRays};
+use crate::scene::{Geometry, Listed, Scene, ShadowRays};
 use crate::shape::{DiskShadow, ParallelogramShadow, PlaneSide, SphereShadow};
 use crate::visibility::{ShadowView, Viewpoint};
 
 /// Light, sixteen samples at a time.
 pub(crate) struct Lanes {
     level: Level,
-    /// What is listed and can stand between the surface looked around from and any light: flat things all, by the
-    /// index that tells on which side of them each light lies.
-    spheres: Vec<SphereShadow>,
-    sphere_opacities: Vec<Opacity>,
+    /// The listed shapes that may occlude any light, seen from the shading point. Flat ones are not culled: they keep
+    /// the index by which the side of each light is known.
+    spheres: Vec<Listed<SphereShadow>>,
     flats: Vec<Listed<ParallelogramShadow>>,
     disks: Vec<Listed<DiskShadow>>,
-    /// Those of them that can stand in the way of the light at hand.
+    /// Those of them that may occlude the light that is summed.
     between: BetweenShapes,
 }
 
-/// What is listed and can stand in the way of one light. Keeps its memory.
+/// The listed shapes that may occlude one light. Keeps its memory.
 #[derive(Default)]
 struct BetweenShapes {
     spheres: Vec<SphereShadow>,
@@ -42,24 +41,17 @@ struct BetweenShapes {
 
 impl Lanes {
     pub fn new(level: Level) -> Self {
-        Lanes {
-            level,
-            spheres: Vec::new(),
-            sphere_opacities: Vec::new(),
-            flats: Vec::new(),
-            disks: Vec::new(),
-            between: BetweenShapes::default(),
-        }
+        Lanes { level, spheres: Vec::new(), flats: Vec::new(), disks: Vec::new(), between: BetweenShapes::default() }
     }
 }
 
-/// What can stand in the way of one light, seen from one surface.
+/// The shapes that may occlude one light, seen from one point.
 #[derive(Clone, Copy, Default)]
 pub(super) struct PointObstacles<'a> {
     pub spheres: &'a [SphereShadow],
     pub flats: &'a [ParallelogramShadow],
     pub disks: &'a [DiskShadow],
-    /// All that lies in trees, and the light that it stands in the way of.
+    /// All that lies in trees, and the light that it may occlude.
     pub trees: Option<(&'a Geometry, LightEnd)>,
     /// For each block of samples, those that are known to be hidden; empty if none are.
     pub hidden: &'a [u16],
@@ -77,8 +69,8 @@ impl<'a> PointObstacles<'a> {
     }
 }
 
-/// The sums over the points of an area light that none of the `obstacles` hides. One dispatch for all samples of a
-/// light: what is below is compiled for each instruction set, the rest once.
+/// The sums over the samples of an area light that no obstacle hides. One dispatch for all samples of a light: the
+/// functions below are compiled for each instruction set, the rest once.
 #[inline(never)]
 pub(super) fn sum_area(level: Level, area: &Area, point: &ShadingPoint, obstacles: &PointObstacles) -> LobeSums {
     dispatch_all!(level, simd => gather_area(simd, area, area.points(), point, obstacles))
@@ -144,7 +136,7 @@ fn gather_area<S: Simd>(
                 continue;
             }
         }
-        // How much is sent this way, and what the surface makes of it
+        // The emission in this direction, times the lobe
         let inverse_distance = splat(1.0) / distance2.sqrt();
         let weight = area.weight_lanes(points, index, l, inverse_distance);
         let cos_i = height * inverse_distance;
@@ -156,8 +148,8 @@ fn gather_area<S: Simd>(
     LobeSums(sums.map(partials))
 }
 
-/// Which of the lanes in `active` something in the trees hides on the ways `l` from a surface. Not inlined: scenes
-/// without trees keep their loop small.
+/// Which of the shadow rays `l` from a point, of the lanes in `active`, meet an occluder in the trees. Not inlined:
+/// scenes without trees keep their loop small.
 #[inline(never)]
 fn hidden_by_trees(
     level: Level,
@@ -186,15 +178,9 @@ fn partials<S: Simd>(v: f32x16<S>) -> LaneSum {
 impl Lighting for Lanes {
     fn look_around(&mut self, scene: &Scene, point: &ShadingPoint) {
         let listed = &scene.occluders;
+        let spheres = listed.spheres.iter().map(|sphere| sphere.map(|shape| shape.shadow(point.p, point.error)));
         self.spheres.clear();
-        self.sphere_opacities.clear();
-        for Listed { shape, opacity } in &listed.spheres {
-            let shadow = shape.shadow(point.p, point.error);
-            if !shadow.is_below(point.horizon) {
-                self.spheres.push(shadow);
-                self.sphere_opacities.push(*opacity);
-            }
-        }
+        self.spheres.extend(spheres.filter(|sphere| !sphere.shape.is_below(point.horizon)));
         let flats = listed.flats.iter();
         self.flats.clear();
         self.flats.extend(flats.map(|flat| flat.map(|shape| shape.shadow(point.p, point.error))));
@@ -209,14 +195,8 @@ impl Lighting for Lanes {
         let Some(area) = light.area() else { return Plain.gather(scene, index, point, counts) };
         let id = LightId(index as u32);
         let BetweenShapes { spheres, flats, disks } = &mut self.between;
-        let spheres = if self.sphere_opacities.iter().all(|opacity| *opacity == Opacity::Opaque) {
-            &self.spheres
-        } else {
-            let stop = self.sphere_opacities.iter().map(|opacity| scene.geometry.stops(*opacity, id));
-            spheres.clear();
-            spheres.extend(self.spheres.iter().zip(stop).filter(|(_, stops)| *stops).map(|(sphere, _)| *sphere));
-            spheres
-        };
+        spheres.clear();
+        spheres.extend(scene.that_stop(&self.spheres, id).map(|(_, sphere)| sphere.shape));
         let sides = scene.occluders.sides(id);
         let is_between = |(i, flat): &(usize, &Listed<ParallelogramShadow>)| {
             !flat.shape.is_one_sided(sides.get(*i).copied().unwrap_or(PlaneSide::Both))

@@ -1,4 +1,4 @@
-//! The lights of a scene as they are asked: what all threads share.
+//! The lights of a scene, prepared for integration and sampling; shared by all threads.
 
 use super::pooled::LightPointSets;
 use crate::color::{DisplaySteps, Rgb};
@@ -9,23 +9,23 @@ use crate::material::LobeKind;
 use crate::scene::Scene;
 use crate::visibility::Target;
 
-/// What all tiles share: the lights as they are integrated, and how errors show.
+/// The lights of a scene, and the weight of their errors.
 pub(crate) struct Lights<'a> {
     /// Those whose unoccluded light is integrated without samples; and how many of them are integrated.
     pub emitters: Vec<Option<Emitter>>,
     pub integrated: usize,
-    /// What the sums of each are multiplied with, before the colours of the surface.
+    /// The factor of the moments of each, before the colours of the surface.
     pub scales: Vec<Rgb>,
     pub steps: DisplaySteps,
-    /// Where there are many.
+    /// Where there are more than [`FEW_LIGHTS`].
     pub tree: Option<LightTree>,
-    /// The lights as shafts lead to them.
+    /// The lights as ends of shafts.
     pub targets: Vec<Target>,
     /// The points of those that are integrated.
     pub point_sets: Vec<LightPointSets>,
-    /// What may stand in the way of those that have an area.
+    /// The listed occluders of those that have an area.
     pub obstacles: Vec<LightOccluders<'a>>,
-    /// In display steps: how far one light may be wrong at a point that stands for a pixel; and the value that many
+    /// In display steps: the allowed error of one light at a point that represents a pixel; and the value that many
     /// steps above black.
     pub allowed: f32,
     pub least: f32,
@@ -45,27 +45,27 @@ impl<'a> Lights<'a> {
         });
         let obstacles = obstacles.collect();
         let steps = DisplaySteps::new(&scene.display, scene.tolerance);
-        // Errors of lights that are not integrated are none, or asked for
+        // Lights that are not integrated have no errors, or their sample count was chosen
         let integrated = scene.lights.iter().filter(|light| light.is_integrated()).count();
         let allowed = TOLERANCE.point / (integrated.max(1) as f32).sqrt();
         let least = steps.value_of(allowed);
         Lights { emitters, integrated, scales, steps, tree, targets, point_sets, obstacles, allowed, least }
     }
 
-    /// Whether anything in trees may be in the way of light `index`, but for planes that are told row by row.
+    /// Whether anything in trees may occlude light `index`, but for planes that have a closed form.
     pub fn has_trees(&self, scene: &Scene, index: usize) -> bool {
         let geometry = &scene.geometry;
         let stops = |thing: &u32| geometry.stops(geometry.placed[*thing as usize].shadow, LightId(index as u32));
         geometry.has_boxes() || !self.know(index, geometry.unbounded.iter().copied().filter(stops))
     }
 
-    /// Whether all of these placed things are told row by row where they are in the way of light `index`.
+    /// Whether all of these placed shapes have a closed form as occluders of light `index`.
     pub fn know(&self, index: usize, placed: impl IntoIterator<Item = u32>) -> bool {
         placed.into_iter().all(|thing| self.obstacles[index].has_placed(thing))
     }
 
-    /// Light `index` as points of one lobe are evaluated for it, with or without what occludes it; `None` if it has no
-    /// area.
+    /// The integration of light `index` at points whose lobes are of one kind, with or without occluders; `None` if it
+    /// has no area.
     pub fn task<'b>(&'b self, index: usize, lobe: Option<LobeKind>, shadows: bool) -> Option<LightTask<'b>> {
         self.emitters[index].as_ref().map(|emitter| LightTask {
             emitter,

@@ -1,12 +1,11 @@
 //! From scene to film.
 //!
 //! Three renderers of the same bits over one scene, where every light is sampled at every camera ray:
-//! [`plain`](plain/index.html) is the specification, one sample at a time; [`lanes`](lanes/index.html) decides sixteen
-//! light samples at once and asks only the shapes that can stand in the way; [`shafts`](shafts/index.html) finds what
-//! can for many points together. They share the way from pixel to surface and from light to film; what differs is how
-//! the light of one source is summed at one surface, the trait [`Lighting`].
+//! [`plain`](plain/index.html) is the specification, one sample at a time; [`lanes`](lanes/index.html) tests sixteen
+//! light samples at once, past the shapes that may occlude the light; [`shafts`](shafts/index.html) gathers occluders
+//! for many points together. They differ in how one light is summed at one surface, the trait [`Lighting`].
 //!
-//! [`cell`](cell/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
+//! [`cell`](cell/index.html) integrates lights, and lights a surface once where an error estimate allows it.
 
 mod cell;
 mod counts;
@@ -56,7 +55,7 @@ use pixel::{Lighting, PixelSum};
 use plain::Plain;
 use shafts::Shafts;
 
-/// Shadow rays between two questions: some hundredths of a second of the fast renderer, some tenths of the plain one.
+/// Shadow rays between two calls of `go_on`: hundredths of a second with shafts, tenths of a second without.
 const QUESTION_EVERY: u64 = 1 << 23;
 
 /// Renders `scene`. `progress(done, all)`, in pixels, is called after each tile from the thread that rendered it, and
@@ -128,7 +127,7 @@ fn expose(
         if stop.load(Ordering::Relaxed) {
             return;
         }
-        // A tile can take minutes: ask in between as well
+        // A tile can take minutes, so a render can be stopped within one
         let go_on = || {
             if progress(done.load(Ordering::Relaxed), all).is_break() {
                 stop.store(true, Ordering::Relaxed);
@@ -153,7 +152,7 @@ fn expose(
             }
             Renderer::Full if is_sampled => Shafts::new(scene, &targets, token).render(film, &go_on),
             Renderer::Full | Renderer::Adaptive => {
-                // Their memory goes from tile to tile
+                // Memory is reused from tile to tile
                 let used = spare.lock().expect("no thread panics while it holds a renderer").pop();
                 let mut cells = used.unwrap_or_else(|| {
                     let direct = DirectLighting::new(scene, &lights, token);
@@ -182,7 +181,7 @@ fn expose(
     };
     match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(|| parallel::for_each(tiles.len(), &|i| render_one(&tiles[i]))),
-        // A system that gives no threads still has this one
+        // Without a pool the calling thread renders
         Err(_) => tiles.iter().for_each(render_one),
     }
     if stop.into_inner() {
@@ -193,7 +192,7 @@ fn expose(
 
 /// Renders `scene` with the default settings, on all processors.
 ///
-/// [`render`] takes settings, tells how far it is, can be stopped, and counts what it does.
+/// [`render`] takes settings, reports progress, can be stopped, and counts its work.
 pub fn render_image(scene: &Scene) -> Image {
     match render(scene, &RenderSettings::default(), &|_, _| ControlFlow::Continue(())) {
         ControlFlow::Continue((film, _)) => film.develop(),
@@ -206,7 +205,7 @@ fn available_threads() -> usize {
 }
 
 /// Renders one tile: n x n camera rays a pixel, row by row, and at each surface all lights in scene order. With `hits`
-/// the camera rays of neighbouring pixels are traced together. `go_on` is asked now and then.
+/// the camera rays of neighbouring pixels are traced together. `go_on` is called between them.
 fn render_tile(
     scene: &Scene,
     film: &mut FilmTile,

@@ -1,4 +1,4 @@
-//! The plain renderer: one light sample at a time, every shape asked. It is the specification; `--reference` runs it.
+//! The plain renderer: one light sample at a time, every shape tested. It is the specification; `--reference` runs it.
 
 use super::Counts;
 use super::pixel::{Lighting, LobeSums};
@@ -48,8 +48,8 @@ impl<'a> Facing<'a> {
         Facing { scene, light, end, point, from: Viewpoint::of(point), cos_o, floor }
     }
 
-    /// What one point of the light, to which `to` leads, adds to the diffuse sum and to that of the highlight. `sample`
-    /// says how much the light sends this way; `None` where nothing arrives.
+    /// The moments of one point of the light, in the direction `to`. `sample` computes its emission towards the surface;
+    /// `None` where nothing arrives.
     #[inline(always)]
     pub fn arriving(
         &self,
@@ -64,9 +64,9 @@ impl<'a> Facing<'a> {
         if !(point.horizon.dot(to.l) > self.floor && height > 0.0) {
             return None;
         }
-        // How much is sent this way
+        // The emission in this direction
         let sample = sample()?;
-        // Nor does what something else hides
+        // Nor does light that an occluder hides
         if self.light.shadows && point.receives_shadow {
             if self.scene.occluded(&self.from.ray(self.end, to.l, to.finite)) {
                 return None;
@@ -74,7 +74,7 @@ impl<'a> Facing<'a> {
         } else {
             counts.shadow_rays_skipped += 1;
         }
-        // What the surface makes of it
+        // Its lobe
         let cos_i = height * sample.inverse_distance;
         let cos_io = point.wo.dot(to.l) * sample.inverse_distance;
         Some(point.bsdf.lobe.moments(cos_i, self.cos_o, cos_io, sample.weight))

@@ -1,8 +1,7 @@
-//! The fast renderer's way through a tile: what may stand before a light is gathered once for neighbouring points.
+//! Sampled light by shafts: the occluders of a light are gathered once for neighbouring points.
 //!
-//! The camera rays of a block of pixels first, then light by light: the points of the block that need it are taken
-//! together, and a [`VisibilityResolver`] finds from which of them the light is lit, hidden, below the horizon, or cut
-//! ([`Sampled`]).
+//! The camera rays of a block of pixels are traced first. Then, light by light, a [`VisibilityResolver`] classifies the
+//! visibility of the light from all points of the block together ([`Sampled`]).
 
 use std::ops::ControlFlow;
 
@@ -61,7 +60,7 @@ impl<'a> Shafts<'a> {
             let pixels = &mut pixels[..(block.width * block.height) as usize];
             let before = counts.work();
             self.block(block, pixels, &mut counts, go_on)?;
-            // What is settled for all points of the block together is shared
+            // The work for all points of the block together is divided among its pixels
             let work = rays + (counts.work() - before) / pixels.len() as f32;
             for (at, (pixel, _)) in block.pixels().zip(pixels) {
                 pixel.resolve(self.scene, 0, &mut sums);
@@ -90,7 +89,7 @@ impl<'a> Shafts<'a> {
             for row in 0..n {
                 for column in 0..n {
                     counts.camera_rays += 1;
-                    // Found anew: to keep a ray costs more than to find it
+                    // Computed again: storing a ray takes longer
                     let (ray, differential) = camera_ray(scene, i * n + column, j * n + row);
                     let hit = self.hits.get([i, j], column, row);
                     if let Some(point) = pixel.see(scene, scene.see(&ray, hit, &differential)) {
@@ -124,7 +123,7 @@ impl<'a> Shafts<'a> {
         let (surfaces, sums) = (&self.surfaces, &mut self.sums);
         sums.clear();
         sums.resize(surfaces.len(), Moments::ZERO);
-        // Those that nothing can shadow
+        // Points that nothing can shadow
         self.order.clear();
         for (k, point) in surfaces.iter().enumerate() {
             if !shines_on(scene, index, point) {
@@ -136,14 +135,14 @@ impl<'a> Shafts<'a> {
                 sums[k] = light.unshadowed(point, counts);
             }
         }
-        // The others in parts that are not too long for someone who waits
+        // The others in parts, between which a render can be stopped
         let at_once = (QUESTION_EVERY / light.samples()).clamp(1, 1 << 20) as usize;
         for part in self.order.chunks_mut(at_once) {
             if counts.shadow_rays >= counts.next_question {
                 counts.next_question = counts.shadow_rays + QUESTION_EVERY;
                 go_on()?;
             }
-            light.settle(&mut self.resolver, &self.points, part, counts, |k, visibility, view| {
+            light.classify(&mut self.resolver, &self.points, part, counts, |k, visibility, view| {
                 sums[k] = light.sent(&surfaces[k], visibility, view);
             });
         }

@@ -1,4 +1,4 @@
-//! The occluders of a light in the BVHs, gathered in the shaft between points and the light.
+//! Occluders in BVHs: gathered in the shaft between points and a light.
 
 use super::DirectLighting;
 use crate::accel::Aabb;
@@ -9,12 +9,12 @@ use crate::render::Counts;
 use crate::scene::{Scene, ShadowMesh};
 use crate::visibility::{ShadowView, Shaft, Target, Viewpoint, Visibility};
 
-/// The most leaves of triangles whose triangles are tested one by one.
+/// The most leaves whose triangles are tested one by one.
 const LEAVES: usize = 12;
 
 impl DirectLighting<'_> {
-    /// Whether no light from `index` is occluded by what is in the BVHs, but for shapes that are integrated as listed ones
-    /// are, from a point and all of its footprint.
+    /// Whether nothing in BVHs occludes a light, seen from a point and all of its footprint, but shapes that are
+    /// integrated as listed ones.
     pub(super) fn is_clear_of_trees(&mut self, index: usize, point: &ShadingPoint) -> bool {
         let (scene, lights, ShadingPoint { reach, turn, .. }) = (self.scene, self.lights, *point);
         if !lights.has_trees(scene, index) {
@@ -31,7 +31,7 @@ impl DirectLighting<'_> {
         !trees.has_meshes() && lights.know(index, trees.others.iter().copied())
     }
 
-    /// What may occlude light `index` from all of some points together, by one shaft.
+    /// The visibility of light `index` from all of some points together, by one shaft.
     pub fn gather_for(&mut self, index: usize, points: &[Viewpoint], counts: &mut Counts) -> Visibility {
         self.indices.clear();
         self.indices.extend(0..points.len() as u32);
@@ -49,7 +49,7 @@ impl DirectLighting<'_> {
     }
 
     /// Classifies the visibility of light `index` from each of those `points` whose numbers are in `order`. `each` gets
-    /// the point's number, its visibility, and, where the light has no closed form, the view that it is sampled by.
+    /// the point's number, the visibility, and, where the light has no closed form, the occluders for sampling.
     pub fn classify(
         &mut self,
         index: usize,
@@ -75,7 +75,7 @@ impl DirectLighting<'_> {
         });
     }
 
-    /// What may occlude light `index`, seen from one point; `None` if it is not visible.
+    /// The occluders of light `index`, seen from one point; `None` if it is not visible.
     pub fn classify_one(&mut self, index: usize, point: &ShadingPoint, counts: &mut Counts) -> Option<ShadowView> {
         let mut kept = self.views.pop().unwrap_or_default();
         if !(self.scene.lights[index].shadows && point.receives_shadow) {

@@ -13,10 +13,10 @@ use crate::render::plain::Plain;
 use crate::scene::Scene;
 use crate::visibility::{ShadowView, Target, Viewpoint, Visibility, VisibilityResolver};
 
-/// The shadows of a light of fewer samples than this show by themselves.
+/// A light of fewer samples casts discernible hard shadows: one a sample.
 const FEW_SAMPLES: usize = 256;
 
-/// A light, and how shafts lead to it.
+/// A light that is sampled at fixed points.
 pub(crate) struct Sampled<'a> {
     scene: &'a Scene,
     level: Level,
@@ -34,17 +34,17 @@ impl<'a> Sampled<'a> {
         &self.scene.lights[self.index]
     }
 
-    /// How many points it has.
+    /// The number of its samples.
     pub fn samples(&self) -> u64 {
         self.light().samples() as u64
     }
 
-    /// Whether something may shadow a surface from it.
+    /// Whether a surface may be in its shadow.
     pub fn is_shadowed(&self, point: &ShadingPoint) -> bool {
         self.light().shadows && point.receives_shadow
     }
 
-    /// What it sends to a point that nothing shadows.
+    /// Its moments at a point that is in no shadow.
     pub fn unshadowed(&self, point: &ShadingPoint, counts: &mut Counts) -> Moments {
         counts.shadow_rays += self.samples();
         counts.shadow_rays_skipped += self.samples();
@@ -53,7 +53,7 @@ impl<'a> Sampled<'a> {
 
     /// Classifies the visibility of the light from those `points` whose indices are in `part`, and calls `each` with
     /// the index, the class and the view of each; see [`VisibilityResolver::resolve`].
-    pub fn settle(
+    pub fn classify(
         &self,
         resolver: &mut VisibilityResolver,
         points: &[Viewpoint],
@@ -62,18 +62,18 @@ impl<'a> Sampled<'a> {
         each: impl FnMut(usize, Visibility, &mut ShadowView),
     ) {
         let all = self.samples() * part.len() as u64;
-        let settled = &mut counts.visibility;
-        let before = *settled;
-        resolver.resolve(self.level, self.scene, self.target, points, part, settled, each);
+        let stats = &mut counts.visibility;
+        let before = *stats;
+        resolver.resolve(self.level, self.scene, self.target, points, part, stats, each);
         // Shadow rays: one for each sample of a partly visible light past listed shapes, or those traced through trees
-        let cut = settled.classes[Visibility::Partial as usize] - before.classes[Visibility::Partial as usize];
-        let traced = settled.traced - before.traced;
-        let asked = if self.scene.geometry.has_trees() { traced } else { self.samples() * cut };
+        let cut = stats.classes[Visibility::Partial as usize] - before.classes[Visibility::Partial as usize];
+        let traced = stats.traced - before.traced;
+        let tested = if self.scene.geometry.has_trees() { traced } else { self.samples() * cut };
         counts.shadow_rays += all;
-        counts.shadow_rays_skipped += all - asked;
+        counts.shadow_rays_skipped += all - tested;
     }
 
-    /// What it sends to a point that sees so much of it.
+    /// Its moments at a point from which it has such a visibility.
     #[inline(always)]
     pub fn sent(&self, point: &ShadingPoint, visibility: Visibility, view: &ShadowView) -> Moments {
         match visibility {
@@ -83,7 +83,7 @@ impl<'a> Sampled<'a> {
         }
     }
 
-    /// The sum of its samples at a point that nothing shadows.
+    /// The sum of its samples at a point that is in no shadow.
     #[inline(always)]
     fn lit(&self, point: &ShadingPoint) -> Moments {
         self.sum(&ShadingPoint { receives_shadow: false, ..*point }, &PointObstacles::default())
@@ -101,8 +101,8 @@ impl<'a> Sampled<'a> {
 }
 
 impl DirectLighting<'_> {
-    /// Sums the samples of an area light at some points of a group, for which its variation over their footprints is
-    /// estimated; where that is unknown, only if the value is wanted all the same.
+    /// Sums the samples of an area light at some points of a group whose estimates have the variation over the
+    /// footprints; where that is unknown, only if the motion of silhouettes does not matter.
     pub(super) fn add_samples(
         &mut self,
         of: &Group,
@@ -116,7 +116,7 @@ impl DirectLighting<'_> {
         let mut order = Vec::with_capacity(members.len());
         for (number, k) in members.iter().enumerate() {
             let (point, estimate) = (of.point(*k), &mut estimates[*k as usize]);
-            // Each of a fixed set of samples casts a hard shadow, which shows where they are few
+            // Each of a fixed set of samples casts a hard shadow
             if area.samples() < FEW_SAMPLES && estimate.motion > 0.0 {
                 *estimate = LightEstimate { visibility: estimate.visibility, ..LightEstimate::UNKNOWN };
             }
@@ -129,7 +129,7 @@ impl DirectLighting<'_> {
                 estimate.moments = light.unshadowed(point, counts);
             }
         }
-        light.settle(&mut self.resolver, &points, &mut order, counts, |number, visibility, view| {
+        light.classify(&mut self.resolver, &points, &mut order, counts, |number, visibility, view| {
             let k = members[number];
             estimates[k as usize].moments = light.sent(of.point(k), visibility, view);
         });

@@ -23,7 +23,7 @@ impl DirectLighting<'_> {
         }
         let to = light.towards(0, point.p);
         let height = point.ns.dot(to.l).min(point.horizon.dot(to.l));
-        // How far the horizon and the light may move against each other over the footprint
+        // The motion of the light against the horizon over the footprint
         let room = point.reach + point.turn * to.l.length();
         if height < -room {
             return alone;
@@ -34,7 +34,7 @@ impl DirectLighting<'_> {
         let distance = if to.finite { to.l.length() } else { f32::INFINITY };
         let casts = light.shadows && point.receives_shadow && visibility != Visibility::Full;
         let is_crossed = casts && self.may_cross_shadow(of.light, to.l, to.finite, point, visibility);
-        // The light sets at once, and a spot's cone ends at once
+        // Irradiance has a corner at the horizon, and at the rim of a spot's cone
         let rim = if height < room { f32::INFINITY } else { light.rim_turn(to.l, point.reach) };
         let turn = self.turn(point, distance).max(rim);
         LightEstimate {
@@ -47,7 +47,7 @@ impl DirectLighting<'_> {
         }
     }
 
-    /// What a light of one point sends.
+    /// The moments of a light of one point.
     pub(super) fn of_single(&self, index: usize, point: &ShadingPoint, visibility: Visibility) -> Moments {
         let receives_shadow = point.receives_shadow && visibility != Visibility::Full;
         let point = ShadingPoint { receives_shadow, ..*point };
@@ -75,7 +75,7 @@ impl DirectLighting<'_> {
         for (_, Listed { shape: sphere, .. }) in scene.that_stop(&listed.spheres, id) {
             let s = (sphere.c - point.p.as_dvec3()).as_vec3();
             let (r, distance) = (sphere.r as f32, s.length());
-            // The surface's own sphere, from outside; not one that another surface runs into
+            // The surface's own sphere, from outside; not one that intersects another surface
             let is_along = s.dot(point.horizon) < -0.9375 * distance;
             if is_along && sphere.shadow(point.p, point.error).is_on() {
                 continue;
@@ -105,7 +105,7 @@ impl DirectLighting<'_> {
             };
             let slack = point.reach + (height.abs() + length.min(1e30)) * 1e-5;
             if height.abs() <= slack && flat.shadow(point.p, point.error).is_one_sided(PlaneSide::Both) {
-                // The surface's own
+                // The plane of the surface itself
                 continue;
             }
             if height > slack && tip > slack || height < -slack && tip < -slack {
@@ -114,7 +114,7 @@ impl DirectLighting<'_> {
             let t = -f64::from(height) / f64::from(n.dot(l));
             let hit = point.p.as_dvec3() + l.as_dvec3() * t;
             let aside = flat.outside(hit) as f32;
-            // Where the way meets the plane at a small angle, it moves there by more than the point
+            // At a small angle the intersection with the plane moves farther than the point
             let wide = slack * (length / n.dot(l).abs()).max(1.0) * 1.25;
             if aside > wide {
                 continue;

@@ -1,4 +1,4 @@
-//! The light cut of a block of patches, and what its nodes contribute to each of them.
+//! The light cut of a block of patches, and the contributions of its nodes to each of them.
 
 use std::ops::Range;
 
@@ -33,7 +33,7 @@ pub(super) struct RepresentativeLight {
 
 impl<'a> Many<'a> {
     /// Lights the patches of a block that lie on one surface. `guess` is a lower estimate of their incident light.
-    #[allow(clippy::too_many_arguments, reason = "a block of a cell, and what it asks with")]
+    #[allow(clippy::too_many_arguments, reason = "a block of a cell, and what lights it")]
     pub(super) fn block(
         &mut self,
         patches: &[Patch],
@@ -53,12 +53,12 @@ impl<'a> Many<'a> {
         let rules = CutRules { tree, steps, receivers: &receivers, colors: &colors, budget: TOLERANCE.crowd };
         let mut cut = std::mem::take(&mut self.cut);
         let (simd, cluster_visibility, cache) = (lights.level(), &mut self.cluster_visibility, &mut self.cache);
-        let mut classify = |node: &LightNode, light: u32| {
+        let mut classify = |node: &LightNode| {
             if !(receives && node.shadows) {
                 return Some(Visibility::Full);
             }
             let around = Aabb { min: node.bounds.low, max: node.bounds.high };
-            cluster_visibility.classify(simd, scene, around, LightId(light))
+            cluster_visibility.classify(simd, scene, around, LightId(node.first(tree)))
         };
         let links = scene.geometry.lights_of(patch(&group[0]).point.surface);
         let shines = |root: &&u32| {
@@ -74,7 +74,7 @@ impl<'a> Many<'a> {
                 cache.set_receiver(scene, &patch.point);
                 cut.nodes.iter().fold(Rgb::BLACK, |sum, (node, estimator)| match entry(*node, *estimator) {
                     entry
-                        if estimator.is_unoccluded()
+                        if estimator.is_unoccluded
                             || RepresentativeLight::new(tree, entry).is_visible(scene, cache, &patch.point) =>
                     {
                         sum + sent(scene, tree, entry, &patch.point).cosine()
@@ -92,11 +92,11 @@ impl<'a> Many<'a> {
         } else {
             cut.finish(&rules, group.len(), &mut classify);
             let start = self.lit.len() as u32;
-            let everywhere = cut.nodes.iter().filter(|(_, estimator)| estimator.is_unoccluded());
+            let everywhere = cut.nodes.iter().filter(|(_, estimator)| estimator.is_unoccluded);
             self.lit.extend(everywhere.map(|(node, estimator)| entry(*node, *estimator)));
             let lit = start..self.lit.len() as u32;
             let start = self.representatives.len() as u32;
-            let sometimes = cut.nodes.iter().filter(|(_, estimator)| !estimator.is_unoccluded());
+            let sometimes = cut.nodes.iter().filter(|(_, estimator)| !estimator.is_unoccluded);
             self.representatives
                 .extend(sometimes.map(|(node, estimator)| RepresentativeLight::new(tree, entry(*node, *estimator))));
             let maybe = start..self.representatives.len() as u32;
@@ -138,7 +138,7 @@ impl<'a> Many<'a> {
         }
     }
 
-    /// What arrives at one patch of a block from the nodes and single lights of its cut; and the diffuse part of it.
+    /// The light at one patch of a block from the nodes and single lights of its cut; and the diffuse part of it.
     pub(super) fn patch(
         &mut self,
         patch: &Patch,
@@ -213,14 +213,10 @@ impl RepresentativeLight {
 
 /// An entry of a list of nodes.
 pub(super) fn entry(node: u32, estimator: NodeEstimator) -> u32 {
-    if matches!(estimator, NodeEstimator::Representative | NodeEstimator::RepresentativeIfVisible) {
-        node | BY_REPRESENTATIVE
-    } else {
-        node
-    }
+    if estimator.by_centroid { node } else { node | BY_REPRESENTATIVE }
 }
 
-/// What the node of an entry contributes: diffuse and specular, before the colours of the surface.
+/// The contribution of the node of an entry: diffuse and specular, before the colours of the surface.
 #[inline(always)]
 pub(super) fn sent(scene: &Scene, tree: &LightTree, entry: u32, point: &ShadingPoint) -> Colors {
     let node = &tree.nodes[(entry & !BY_REPRESENTATIVE) as usize];
@@ -230,7 +226,7 @@ pub(super) fn sent(scene: &Scene, tree: &LightTree, entry: u32, point: &ShadingP
     sent_by_one(scene, &tree.nodes[node.representative as usize], point).map(|sent| node.power * sent)
 }
 
-/// What one light contributes for a power of 1.
+/// The moments of one light for a power of 1.
 pub(super) fn sent_by_one(scene: &Scene, one: &LightNode, point: &ShadingPoint) -> Moments {
     let NodeContents::Light(light) = one.contents else { return Moments::ZERO };
     let light = &scene.lights[light as usize];

@@ -1,5 +1,4 @@
-//! From what arrives at patches to the colour of a pixel: terms with too large an error are evaluated at each camera
-//! ray.
+//! From the light at patches to the terms of a pixel: those with too large an error are evaluated at each camera ray.
 
 use std::ops::Range;
 
@@ -100,7 +99,7 @@ impl<'a> Many<'a> {
             let light = same[0].0;
             scaled.push(ScaledTerm { light: Some(light), scale: lights.scale(light as usize), term });
         }
-        // Of many scales
+        // Nodes hold lights of different scales, which are in their powers
         scaled.push(ScaledTerm { light: None, scale: Rgb::WHITE, term: together });
         Apart::finish(&mut kept, lights, apart);
         (self.terms, self.cache, self.uncertain, self.kept) = (terms, cache, uncertain, kept);

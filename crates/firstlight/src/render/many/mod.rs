@@ -1,5 +1,4 @@
-//! More than [`FEW_LIGHTS`](crate::light::FEW_LIGHTS) lights: what arrives at the fragments of a cell, where not every
-//! light is evaluated at every one.
+//! More than [`FEW_LIGHTS`](crate::light::FEW_LIGHTS) lights: direct lighting of the fragments of a cell by light cuts.
 //!
 //! Each block of pixels, or each of its quarters where many lights are near, has a [`Cut`]: nodes of the
 //! [`LightTree`], estimated by their centroid or by a representative light, and single lights
@@ -49,7 +48,7 @@ const LEVELS: usize = 3;
 /// Different colours of a block that are kept; all others are joined with the last.
 const MAX_COLORS: usize = 8;
 
-/// What arrives at the fragments of one cell. Keeps its memory.
+/// Direct lighting of the fragments of one cell. Keeps its memory.
 pub(super) struct Many<'a> {
     scene: &'a Scene,
     patches: Patches,
@@ -58,7 +57,7 @@ pub(super) struct Many<'a> {
     cluster_visibility: ClusterVisibility,
     cut: Cut,
     cache: ListedOccluderCache,
-    /// What arrives at each patch.
+    /// The light at each patch.
     stored: Vec<PatchLight>,
     /// The single lights, patch by patch, in scene order.
     singles: Vec<SingleLight>,
@@ -77,7 +76,7 @@ pub(super) struct Many<'a> {
 struct SingleLight {
     light: u32,
     moments: Moments,
-    /// How far the mean of its moments over the patch may be from those at the point.
+    /// The difference between the mean of its moments over the patch and those at the point.
     bend: f32,
 }
 
@@ -154,7 +153,7 @@ impl<'a> Many<'a> {
         lit
     }
 
-    /// Evaluates what arrives at each patch of a cell.
+    /// Evaluates the light at each patch of a cell.
     fn light_patches(
         &mut self,
         patches: &Patches,
@@ -204,7 +203,7 @@ impl<'a> Many<'a> {
         stored.lit.clone().into_iter().flat_map(|range| &self.lit[range.start as usize..range.end as usize]).copied()
     }
 
-    /// Adds what the nodes of one list contribute.
+    /// Adds the contributions of the nodes of one list.
     fn add(&self, patch: &Patch, list: usize, stored: &mut PatchLight) {
         let (point, lobe) = (&patch.point, &patch.point.bsdf.lobe);
         let range = &stored.lit[list];

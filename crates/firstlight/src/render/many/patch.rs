@@ -79,7 +79,7 @@ impl Patch {
         [self.pixel % CELL, self.pixel / CELL]
     }
 
-    /// By what its samples differ from those of others.
+    /// The seed of its samples.
     pub fn salt(&self) -> u32 {
         salt(self.at(), self.point.surface)
     }

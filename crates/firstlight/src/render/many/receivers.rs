@@ -52,26 +52,21 @@ pub(super) fn receiver_colors(scene: &Scene, bsdf: &Bsdf) -> ReceiverColors {
     ReceiverColors { base: bsdf.base(scene.ambient), known: bsdf.colors.cosine(), error: bsdf.colors }
 }
 
-/// The colours of some patches: each once, or where they are too many the rest as one.
+/// The colours of some patches, each once; beyond [`MAX_COLORS`] the bounds of the rest are one entry.
 pub(super) fn colors<'p>(scene: &Scene, patches: impl Iterator<Item = &'p Patch>) -> Vec<ReceiverColors> {
     let mut colors: Vec<ReceiverColors> = Vec::with_capacity(MAX_COLORS);
     for patch in patches {
         let new = receiver_colors(scene, &patch.point.bsdf);
-        let same =
-            |known: &ReceiverColors| known.known == new.known && known.error == new.error && known.base == new.base;
-        if colors.iter().any(same) {
+        if colors.contains(&new) {
             continue;
         }
-        if colors.len() < MAX_COLORS {
-            colors.push(new);
-            continue;
+        match colors.get_mut(MAX_COLORS - 1) {
+            None => colors.push(new),
+            Some(last) => {
+                let (base, known) = (last.base.min(new.base), last.known.min(new.known));
+                *last = ReceiverColors { base, known, error: last.error.max(new.error) };
+            }
         }
-        let last = &mut colors[MAX_COLORS - 1];
-        *last = ReceiverColors {
-            base: last.base.min(new.base),
-            known: last.known.min(new.known),
-            error: last.error.max(new.error),
-        };
     }
     colors
 }
