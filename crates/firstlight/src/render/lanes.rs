@@ -184,7 +184,7 @@ fn partials<S: Simd>(v: f32x16<S>) -> LaneSum {
 }
 
 impl Lighting for Lanes {
-    fn look_around(&mut self, scene: &Scene, point: &ShadingPoint) {
+    fn set_receiver(&mut self, scene: &Scene, point: &ShadingPoint) {
         let listed = &scene.occluders;
         self.spheres.clear();
         self.sphere_opacities.clear();
