@@ -90,8 +90,6 @@ pub(crate) struct CellRenderer<'a> {
     scene: &'a Scene,
     mode: AaMode,
     lights: DirectLighting<'a>,
-    /// All shapes that camera rays may hit.
-    shapes: Vec<VisibleShape>,
     corner: [u32; 2],
     /// Pixel by pixel of the cell.
     states: Vec<PixelState>,
@@ -123,7 +121,6 @@ impl<'a> CellRenderer<'a> {
             scene,
             mode,
             lights,
-            shapes: VisibleShape::all(scene),
             corner: [0; 2],
             states: vec![PixelState::Done; PIXELS],
             sums: TermSums::new(scene, PIXELS, buffers),
@@ -157,7 +154,7 @@ impl<'a> CellRenderer<'a> {
     /// Renders a cell.
     fn cell(&mut self, corner: [u32; 2], counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
         self.begin(corner);
-        self.primary(counts);
+        self.primary(Square { x: corner[0], y: corner[1], side: CELL }, &VisibleShape::all(self.scene), counts);
         go_on()?;
         if let Some(mut many) = self.many.take() {
             let lit = self.many(&mut many, counts, go_on);
@@ -417,22 +414,21 @@ impl<'a> CellRenderer<'a> {
     /// Whether the estimates of a light at the shading points of a rate represent a fragment.
     fn represent(&self, rate: ShadingRate, query: &FragmentQuery, estimates: &[LightEstimate]) -> bool {
         let fragment = &self.fragments.all[query.fragment as usize];
+        let light = query.light;
         match (rate, estimates) {
             (_, []) => false,
             (ShadingRate::Fragment, [center]) => {
+                // A light that is seen from all of the fragment varies with the direction to it
+                let is_nearly_uniform = || {
+                    center.turn <= TOLERANCE.middle_turn
+                        && self.bend(fragment, light, center, center.turned()) <= TOLERANCE.middle_bend
+                };
                 let is_dark = center.moments == Moments::ZERO;
                 center.moments.is_known()
-                    && (fragment.count == 1
-                        || center.is_uniform && (is_dark || self.is_nearly_uniform(fragment, query.light, center)))
+                    && (fragment.count == 1 || center.is_uniform && (is_dark || is_nearly_uniform()))
             }
-            _ => self.is_smooth_over_quadrants(fragment, query.light, estimates),
+            _ => self.is_smooth_over_quadrants(fragment, light, estimates),
         }
-    }
-
-    /// Whether a light that is seen from all of a fragment, or not at all, varies little over it.
-    fn is_nearly_uniform(&self, fragment: &Fragment, light: u32, center: &LightEstimate) -> bool {
-        center.turn <= TOLERANCE.middle_turn
-            && self.bend(fragment, light, center, center.turned()) <= TOLERANCE.middle_bend
     }
 
     /// The display steps that such a part of all that a light can send makes at a shading point of a fragment.

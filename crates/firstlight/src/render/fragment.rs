@@ -4,7 +4,6 @@
 use std::ops::Range;
 
 use super::visible_shape::{MeanBsdf, VisibleShape};
-use crate::film::hits::camera_ray;
 use crate::ids::SurfaceId;
 use crate::integrate::TOLERANCE;
 use crate::material::{Bsdf, Colors, Material, ShadingPoint};
@@ -14,20 +13,13 @@ use crate::scene::Scene;
 /// Fragments of at most so many rays have no quadrants.
 const FEW_RAYS: usize = 4;
 
-/// The hit of a camera ray and one shape.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct RayHit {
-    pub ray: Ray,
-    pub t: f64,
-    /// Column and row in its pixel.
-    pub at: [u16; 2],
-}
-
-/// The shading point of a camera ray.
+/// The hit of a camera ray and a surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayPoint {
+    /// The shape; `None` if it is in the trees.
+    pub shape: Option<VisibleShape>,
     pub point: ShadingPoint,
-    /// Column and row in its pixel.
+    /// Column and row in the pixel of the ray.
     pub at: [u16; 2],
 }
 
@@ -129,57 +121,23 @@ impl Fragments {
         if rate == ShadingRate::Ray { (1, Colors::BLACK) } else { self.parts[point] }
     }
 
-    /// Adds a fragment of a shape for some rays of a pixel, number `number` of those with fragments. `share` is the
-    /// share of the pixel by which errors are judged.
-    pub fn add(
-        &mut self,
-        scene: &Scene,
-        number: u32,
-        [i, j]: [u32; 2],
-        shape: VisibleShape,
-        hits: impl Iterator<Item = RayHit> + Clone,
-        share: f32,
-    ) {
-        let n = scene.antialiasing;
-        let ends = hits.clone().map(|RayHit { ray, t, .. }| (ray.o.as_dvec3() + ray.d.as_dvec3() * t).as_vec3());
-        let plain = self.plain_bsdf(scene, shape);
-        let constant = plain.or_else(|| {
-            let is_alone = ends.clone().nth(1).is_none();
-            if is_alone { None } else { shape.constant_bsdf_at(scene, [i, j], ends) }
-        });
-        let first = self.rays.len();
-        for RayHit { ray, t, at } in hits {
-            let own = || {
-                let [x, y] = [i * n + u32::from(at[0]), j * n + u32::from(at[1])];
-                shape.bsdf(scene, &ray, t, &camera_ray(scene, x, y).1)
-            };
-            self.rays.push(shape.point(scene, &ray, t, &constant.unwrap_or_else(own)));
-            self.at.push(at);
-        }
-        self.push(scene, number, [i, j], Some(shape), first, share);
-    }
-
-    /// Adds fragments of what is in the trees for some rays of a pixel: one for each surface, or one for each ray
-    /// unless `grouped`. `share` returns the share of so many rays; for the rest see [`add`](Self::add).
-    pub fn add_from_trees(
-        &mut self,
-        scene: &Scene,
-        number: u32,
-        at: [u32; 2],
-        rays: &mut Vec<RayPoint>,
-        grouped: bool,
-        share: impl Fn(usize) -> f32,
-    ) {
-        while let Some(RayPoint { point, .. }) = rays.first().copied() {
+    /// Adds fragments for some rays of a pixel, number `number` of those with fragments: one for each surface, or one
+    /// for each ray unless `grouped`.
+    pub fn add(&mut self, scene: &Scene, number: u32, at: [u32; 2], rays: &mut Vec<RayPoint>, grouped: bool) {
+        let all = (scene.antialiasing * scene.antialiasing) as f32;
+        while let Some(RayPoint { shape, point, .. }) = rays.first().copied() {
             let first = self.rays.len();
             let mut is_first = true;
-            let is_alike =
-                |ray: &mut RayPoint| std::mem::take(&mut is_first) || grouped && is_one_surface(&point, &ray.point);
-            for RayPoint { point, at } in rays.extract_if(.., is_alike) {
+            let is_alike = |ray: &mut RayPoint| {
+                let is_same = || ray.shape == shape && (shape.is_some() || is_one_surface(&point, &ray.point));
+                std::mem::take(&mut is_first) || grouped && is_same()
+            };
+            for RayPoint { point, at, .. } in rays.extract_if(.., is_alike) {
                 self.rays.push(point);
                 self.at.push(at);
             }
-            self.push(scene, number, at, None, first, share(self.rays.len() - first));
+            let share = if grouped { (self.rays.len() - first) as f32 / all } else { 1.0 };
+            self.push(scene, number, at, shape, first, share);
         }
     }
 

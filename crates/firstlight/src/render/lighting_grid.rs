@@ -163,10 +163,11 @@ impl LightingGrid {
             let (square, (number, _)) = group[0];
             let block = &blocks[number as usize];
             let of = SquareNodes::at_corners(square, n);
-            let Some(nodes) = self.nodes(lights, block, &of) else {
+            let nodes = of.positions().map(|at| self.node(lights, block, at));
+            if nodes.contains(&NONE) {
                 failed.extend(group);
                 continue;
-            };
+            }
             for (_, (_, light)) in group {
                 let point = points.len() as u32;
                 queries.push(LightQuery { point, light: *light, visibility: Visibility::Partial });
@@ -218,33 +219,25 @@ impl LightingGrid {
         ControlFlow::Continue(failed)
     }
 
-    /// The nodes of a square on a block; `None` if a ray misses the shape by a rounding.
-    fn nodes(&mut self, lights: &DirectLighting, block: &SurfaceBlock, of: &SquareNodes) -> Option<[u32; 9]> {
-        let mut nodes = [NONE; 9];
-        for (node, at) in nodes.iter_mut().zip(of.positions()) {
-            *node = self.node(lights, block, at)?;
-        }
-        Some(nodes)
-    }
-
-    fn node(&mut self, lights: &DirectLighting, block: &SurfaceBlock, [x, y]: [u32; 2]) -> Option<u32> {
+    /// The node of a block at a corner of pixels; [`NONE`] if the ray there misses the shape by a rounding.
+    fn node(&mut self, lights: &DirectLighting, block: &SurfaceBlock, [x, y]: [u32; 2]) -> u32 {
         let corner = (y - self.corner[1]) as usize * CORNERS + (x - self.corner[0]) as usize;
         let mut node = self.first[corner];
         while node != NONE {
             let GridNode { shape, lobe, next } = self.nodes[node as usize];
             if (shape, lobe) == (block.shape, block.bsdf.lobe) {
-                return Some(node);
+                return node;
             }
             node = next;
         }
         let (ray, _) = lights.scene.camera.local_ray(x as f32, y as f32, 1.0);
-        let t = block.shape.intersect(lights.scene, &ray)?;
+        let Some(t) = block.shape.intersect(lights.scene, &ray) else { return NONE };
         self.points.push(block.shape.point(lights.scene, &ray, t, &block.bsdf));
         self.nodes.push(GridNode { shape: block.shape, lobe: block.bsdf.lobe, next: self.first[corner] });
         let node = self.nodes.len() as u32 - 1;
         self.first[corner] = node;
         self.moments.resize(self.nodes.len() * self.lights, None);
-        Some(node)
+        node
     }
 
     /// The center of a square, with a footprint of all of it.

@@ -4,6 +4,7 @@
 //! are culled. If the rays through the corners all hit one convex shape, so do all rays between them; if that shape is
 //! nearer in the frustum than any other can be, no ray sees another.
 
+use super::square::Square;
 use super::visible_shape::VisibleShape;
 use crate::accel::{HalfSpace, Planes};
 use crate::light::AreaShape;
@@ -29,8 +30,8 @@ pub(crate) struct TileFrustum {
 const SLACK: f64 = 1e-5;
 
 impl TileFrustum {
-    /// The frustum of the pixels from (`left`, `top`), `side` across and down.
-    pub fn new(scene: &Scene, left: f32, top: f32, side: f32) -> Self {
+    pub fn new(scene: &Scene, square: Square) -> Self {
+        let [left, top, side] = [square.x, square.y, square.side].map(|pixels| pixels as f32);
         let (right, bottom) = (left + side, top + side);
         let at = |x: f32, y: f32| scene.camera.local_ray(x, y, 1.0).0;
         let corners = [at(left, top), at(right, top), at(right, bottom), at(left, bottom)];
@@ -104,11 +105,10 @@ impl TileFrustum {
         heights.iter().all(|[height, _]| *height == 0.0) || self.corners.iter().zip(&heights).all(leads_away)
     }
 
-    /// Replaces `into` by those of the shapes `from` that the rays may hit.
-    pub fn candidates(&self, scene: &Scene, from: &[VisibleShape], into: &mut Vec<VisibleShape>) {
-        into.clear();
+    /// Those of some shapes that the rays may hit.
+    pub fn candidates(&self, scene: &Scene, shapes: &[VisibleShape]) -> Vec<VisibleShape> {
         let geometry = &scene.geometry;
-        into.extend(from.iter().filter(|shape| match shape {
+        let may_be_hit = |shape: &VisibleShape| match shape {
             VisibleShape::Sphere(i) => !self.misses_sphere(&geometry.spheres[*i as usize].shape),
             VisibleShape::Parallelogram(i) => !self.misses_flat(&geometry.parallelograms[*i as usize].shape),
             VisibleShape::Plane(i) => !self.misses_plane(scene, *i),
@@ -119,7 +119,8 @@ impl TileFrustum {
                 AreaShape::Disk(_) => true,
             }),
             VisibleShape::Trees => geometry.may_meet(scene.level, &self.planes()),
-        }));
+        };
+        shapes.iter().copied().filter(may_be_hit).collect()
     }
 
     /// The half spaces that the frustum is the intersection of.

@@ -4,7 +4,6 @@
 
 use std::ops::{ControlFlow, Range};
 
-use super::penumbra_grid::PixelNode;
 use super::{CellRenderer, FragmentQuery, PIXELS};
 use crate::color::Rgb;
 use crate::film::resolve::LightTerm;
@@ -41,8 +40,8 @@ pub(super) struct MeshShadows {
     unoccluded: Vec<Vec<Moments>>,
     /// The visible fraction of each light from each pixel by pilot rays; `None` before they are traced.
     pub(super) pilot: Vec<Option<f32>>,
-    /// The interpolation nodes: pixel, light, and its value.
-    pub(super) nodes: Vec<(usize, usize, PixelNode)>,
+    /// The interpolation nodes: pixel, light, its mean over the camera rays, and its visible fraction.
+    pub(super) nodes: Vec<(usize, usize, (Moments, f32))>,
 }
 
 /// No fragment.

@@ -30,13 +30,6 @@ const PILOT_RAYS: usize = 16;
 /// Pixels across a block whose pilot rays are traced together.
 const BLOCK: u32 = 4;
 
-/// A node: the mean of a light over the camera rays of a pixel.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PixelNode {
-    moments: Moments,
-    visible_fraction: f32,
-}
-
 /// The sums of the differences between pilot rays and interpolated visible fractions, and of their variances: of each
 /// row, of each column, and of all of a square.
 struct PilotTest {
@@ -291,7 +284,7 @@ impl CellRenderer<'_> {
         let of = self.nodes_of(square);
         let positions = of.positions();
         let nodes = positions.map(|at| self.pixel_node(at, light, counts));
-        let (moments, fractions) = (nodes.map(|node| node.moments), nodes.map(|node| node.visible_fraction));
+        let (moments, fractions) = (nodes.map(|node| node.0), nodes.map(|node| node.1));
         // Where nothing occludes the light, each pixel has its closed form
         if fractions == [1.0; 9] && square.pixels().all(|at| self.pilot(self.index(at), light) == 1.0) {
             self.note_all(square, light, Visibility::Listed);
@@ -336,8 +329,8 @@ impl CellRenderer<'_> {
         true
     }
 
-    /// The light at a pixel by all of its rays.
-    fn pixel_node(&mut self, at: [u32; 2], light: usize, counts: &mut Counts) -> PixelNode {
+    /// The value of a node: the mean of a light over the camera rays of its pixel, and its visible fraction.
+    fn pixel_node(&mut self, at: [u32; 2], light: usize, counts: &mut Counts) -> (Moments, f32) {
         let index = self.index(at);
         if let Some((.., node)) = self.shadows.nodes.iter().find(|(of, by, _)| (*of, *by) == (index, light)) {
             return *node;
@@ -348,7 +341,7 @@ impl CellRenderer<'_> {
         let part = 1.0 / *count as f32;
         let pooled = self.pool_alone(fragment, light, counts);
         self.note(fragment, light, FragmentLight::Summed(pooled.terms));
-        let node = PixelNode { moments: pooled.moments * part, visible_fraction: pooled.visible_fraction };
+        let node = (pooled.moments * part, pooled.visible_fraction);
         self.shadows.nodes.push((index, light, node));
         node
     }

@@ -1,12 +1,14 @@
 //! The surfaces that the pixels of a cell see. Squares that provably see one surface are found without a ray for each
 //! pixel; the rays of all other pixels are traced, those that may hit something in the trees in packets.
 
-use super::{CELL, CellRenderer, Pixel, PixelState};
+use std::iter;
+
+use super::{CellRenderer, Pixel, PixelState};
 use crate::film::hits::camera_ray;
 use crate::film::resolve::{LightTerm, PixelTerms};
 use crate::material::{Lobe, ShadingPoint};
 use crate::math::Ray;
-use crate::render::fragment::{RayHit, RayPoint};
+use crate::render::fragment::RayPoint;
 use crate::render::lighting_grid::SurfaceBlock;
 use crate::render::square::Square;
 use crate::render::tile_frustum::TileFrustum;
@@ -22,35 +24,20 @@ const TEXTURED: u32 = 8;
 /// The most lobes of such a square: each has nodes of its own.
 const LOBES: usize = 4;
 
-/// What a camera ray hits.
-enum Seen {
-    Background,
-    Light(usize),
-    Shape(VisibleShape, f64),
-    InTrees(Hit),
-}
+/// What a camera ray hits, and the shape if that is one by itself.
+type Seen = Option<(Option<VisibleShape>, Hit)>;
 
 impl CellRenderer<'_> {
-    /// Finds the surfaces that the pixels of the cell see.
-    pub(super) fn primary(&mut self, counts: &mut Counts) {
-        let [x, y] = self.corner;
-        let frustum = TileFrustum::new(self.scene, x as f32, y as f32, CELL as f32);
-        let mut near = Vec::new();
-        frustum.candidates(self.scene, &self.shapes, &mut near);
-        self.split(Square { x, y, side: CELL }, &near, counts);
-    }
-
     /// Finds the surfaces that the pixels of a square see. `candidates` are all shapes that a square around it may see.
-    fn split(&mut self, square: Square, candidates: &[VisibleShape], counts: &mut Counts) {
+    pub(super) fn primary(&mut self, square: Square, candidates: &[VisibleShape], counts: &mut Counts) {
         let scene = self.scene;
-        let frustum = TileFrustum::new(scene, square.x as f32, square.y as f32, square.side as f32);
-        let mut near = Vec::new();
-        frustum.candidates(scene, candidates, &mut near);
+        let frustum = TileFrustum::new(scene, square);
+        let near = frustum.candidates(scene, candidates);
         if near.is_empty() {
             let terms = PixelTerms { background: self.rays_per_pixel(), ..PixelTerms::default() };
             for at in self.on_film(square) {
                 let index = self.index(at);
-                terms.resolve(scene, std::iter::empty(), index, &mut self.sums);
+                terms.resolve(scene, iter::empty(), index, &mut self.sums);
             }
             return;
         }
@@ -66,7 +53,7 @@ impl CellRenderer<'_> {
         let in_packets = near.contains(&VisibleShape::Trees);
         if square.side > if in_packets { SMALLEST.max(self.hits.side()) } else { SMALLEST } {
             for quarter in square.quarters_on([scene.width, scene.height]) {
-                self.split(quarter, &near, counts);
+                self.primary(quarter, &near, counts);
             }
         } else if in_packets {
             self.trace_packets(square, counts);
@@ -88,15 +75,8 @@ impl CellRenderer<'_> {
             self.hits.trace(scene, left, top, w, h);
             for (row, column) in (0..h).flat_map(|row| (0..w).map(move |column| (row, column))) {
                 let seen = |cells: &Self, [x, y]: [u16; 2], _: &Ray| {
-                    let Some(hit) = cells.hits.get(column, row, x.into(), y.into()) else { return Seen::Background };
-                    match (
-                        hit.surface.index().checked_sub(scene.geometry.surfaces.len()),
-                        VisibleShape::of(scene, &hit),
-                    ) {
-                        (Some(light), _) => Seen::Light(light),
-                        (None, Some(shape)) => Seen::Shape(shape, hit.t),
-                        (None, None) => Seen::InTrees(hit),
-                    }
+                    let hit = cells.hits.get(column, row, x.into(), y.into())?;
+                    Some((VisibleShape::of(scene, &hit), hit))
                 };
                 self.add_pixel([left + column, top + row], seen, counts);
             }
@@ -113,11 +93,7 @@ impl CellRenderer<'_> {
                 let is_nearer = other.1 < one.1 || other.1 == one.1 && other.0.surface(scene) < one.0.surface(scene);
                 if is_nearer { other } else { one }
             };
-            match hits.reduce(nearer) {
-                None => Seen::Background,
-                Some((VisibleShape::Light(light), _)) => Seen::Light(light as usize),
-                Some((shape, t)) => Seen::Shape(shape, t),
-            }
+            hits.reduce(nearer).map(|(shape, t)| (Some(shape), shape.hit_at(scene, ray, t)))
         };
         self.add_pixel(at, seen, counts);
     }
@@ -138,38 +114,39 @@ impl CellRenderer<'_> {
         let (scene, n) = (self.scene, self.scene.antialiasing);
         let mut pixel = self.pixel([i, j], n * n, counts);
         let rays = self.pixel_rays.of(scene, [i, j]).to_vec();
-        let (mut on_shapes, mut in_trees) = (Vec::new(), Vec::new());
+        let mut points = Vec::new();
         for (k, ray) in (0..).zip(rays) {
             let at = [k % n, k / n].map(|at| at as u16);
-            match seen(self, at, &ray) {
-                Seen::Background => pixel.terms.background += 1,
-                Seen::Light(light) => pixel.terms.emission.add(scene.lights[light].radiance, 1),
-                Seen::Shape(shape, t) => on_shapes.push((shape, RayHit { ray, t, at })),
-                Seen::InTrees(hit) => {
-                    // Only textures need differentials
-                    let differential = match scene.textures.is_empty() {
-                        true => RayDifferential::default(),
-                        false => camera_ray(scene, i * n + k % n, j * n + k / n).1,
-                    };
-                    let si = scene.local_surface(&ray, &hit, &differential);
-                    let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
-                    in_trees.push(RayPoint { point: ShadingPoint::of(&si, &bsdf, scene.ambient), at });
-                }
+            // Only textures need differentials
+            let differential = || match scene.textures.is_empty() {
+                true => RayDifferential::default(),
+                false => camera_ray(scene, i * n + k % n, j * n + k / n).1,
+            };
+            let Some((shape, hit)) = seen(self, at, &ray) else {
+                pixel.terms.background += 1;
+                continue;
+            };
+            if let Some(light) = hit.surface.index().checked_sub(scene.geometry.surfaces.len()) {
+                pixel.terms.emission.add(scene.lights[light].radiance, 1);
+                continue;
             }
+            let point = match shape {
+                Some(shape) => {
+                    let plain = self.fragments.plain_bsdf(scene, shape);
+                    let bsdf = plain.unwrap_or_else(|| shape.bsdf(scene, &ray, hit.t, &differential()));
+                    shape.point(scene, &ray, hit.t, &bsdf)
+                }
+                None => {
+                    let si = scene.local_surface(&ray, &hit, &differential());
+                    let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
+                    ShadingPoint::of(&si, &bsdf, scene.ambient)
+                }
+            };
+            points.push(RayPoint { shape, point, at });
         }
         let number = self.pixels.len() as u32;
         self.pixels.push(pixel);
-        let grouped = self.mode == AaMode::Adaptive;
-        let share = |count: usize| if grouped { count as f32 / (n * n) as f32 } else { 1.0 };
-        for (k, (shape, ray)) in on_shapes.iter().enumerate() {
-            if !grouped {
-                self.fragments.add(scene, number, [i, j], *shape, std::iter::once(*ray), 1.0);
-            } else if on_shapes[..k].iter().all(|(before, _)| before != shape) {
-                let same = on_shapes[k..].iter().filter(|(other, _)| other == shape).map(|(_, ray)| *ray);
-                self.fragments.add(scene, number, [i, j], *shape, same.clone(), share(same.count()));
-            }
-        }
-        self.fragments.add_from_trees(scene, number, [i, j], &mut in_trees, grouped, share);
+        self.fragments.add(scene, number, [i, j], &mut points, self.mode == AaMode::Adaptive);
     }
 
     /// Adds the blocks of a square that provably sees one shape: one of each lobe.
