@@ -11,8 +11,8 @@ use crate::ids::LightId;
 use crate::material::ShadingPoint;
 use crate::math::{LANES, Ray, Vec3};
 use crate::render::Counts;
-use crate::render::given::Given;
-pub use crate::render::given::{ChoosePoints, LightPoint};
+use crate::render::chosen_points::ChosenPoints;
+pub use crate::render::chosen_points::{ChoosePoints, LightPoint};
 use crate::render::pixel::PixelSum;
 use crate::scene::{CompileOptions, Scene, SceneDesc, ShadowRays, TracedHit};
 use crate::shape::{RayDifferential, SurfaceInteraction, TileHits, TriangleTree, every};
@@ -399,7 +399,7 @@ pub fn pixel(scene: &Scene, at: [u32; 2], choose: &mut ChoosePoints) -> [f32; 4]
     let mut sum = PixelSum::new(scene);
     let hit = |_, _, ray: &Ray| scene.intersect_local(ray);
     let go_on = || ControlFlow::Continue(());
-    let _ = sum.sample(scene, at, &mut Given::new(choose), hit, &mut Counts::default(), &go_on);
+    let _ = sum.sample(scene, at, &mut ChosenPoints::new(choose), hit, &mut Counts::default(), &go_on);
     let mut sums = TermSums::new(scene, 1, &[]);
     sum.resolve(scene, 0, &mut sums);
     sums.colors[0]

@@ -1,35 +1,35 @@
-//! What a render did, in numbers.
+//! The statistics of a render.
 
 use super::SimdLevel;
 use crate::film::Heat;
 use crate::visibility::{Visibility, VisibilityStats};
 
-/// What a render did.
+/// The statistics of a render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RenderStats {
-    /// Rays from the camera.
+    /// Camera rays.
     pub camera_rays: u64,
-    /// Pairs of a lit point and a point of a light that were decided.
+    /// Pairs of a shading point and a point of a light whose visibility was found.
     pub shadow_rays: u64,
-    /// Those of them that took no ray: nothing could stand between, or the light casts no shadows.
+    /// Those of them without a ray: nothing can occlude the light, or it casts no shadows.
     pub shadow_rays_skipped: u64,
-    /// Pairs of a lit point and a light: all of it arrives, one thing hides it, it is below the horizon, each sample
-    /// has an answer of its own. Counted where shafts are used, as the next three are.
+    /// Pairs of a shading point and a light, by visibility: fully visible, hidden by one occluder, below the horizon,
+    /// partially visible. Counted where shafts are used, as the next three are.
     pub visibility: [u64; 4],
-    /// Pairs of a lit point and a light that is integrated, of which some is hidden by things so few that what is left
-    /// is known in closed form. Not among those of `visibility`.
+    /// Pairs of a shading point and an integrated light that is partially visible past occluders with a closed form.
+    /// Not among those of `visibility`.
     pub closed_form: u64,
     /// Batches of sixteen lanes in which area lights were evaluated.
     pub batches: u64,
-    /// The points in them.
+    /// The shading points in these batches.
     pub batched_points: u64,
-    /// Shafts from points to lights.
+    /// Shafts from shading points to lights.
     pub shafts: u64,
-    /// What they held that could stand in the way, all together.
+    /// The occluders in these shafts, all together.
     pub occluders: u64,
-    /// Shadow rays for which trees were asked all the same.
+    /// Shadow rays that were traced through the trees.
     pub traced: u64,
-    /// What was done with lights, where they are many and integrated.
+    /// The statistics of many integrated lights.
     pub lights: LightCounts,
     /// The instruction set; `Fallback` for the plain renderer.
     pub simd: SimdLevel,
@@ -38,7 +38,7 @@ pub struct RenderStats {
 }
 
 impl RenderStats {
-    /// Of two renders together, as the later one was made.
+    /// The sums of two renders, with the instruction set and the threads of the later one.
     pub fn and(&self, later: &RenderStats) -> RenderStats {
         let mut sum = *later;
         sum.camera_rays += self.camera_rays;
@@ -61,20 +61,20 @@ impl RenderStats {
     }
 }
 
-/// Where lights are many: what was done with them.
+/// The statistics of many integrated lights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LightCounts {
-    /// Pairs of a lit place and a light.
+    /// Pairs of a shading point and a light.
     pub pairs: u64,
-    /// Those of them where the light was asked for by itself.
+    /// Those of them for which the light was integrated.
     pub singly: u64,
-    /// Those where it is proved to be seen whole, and was taken for a point, by itself or together with others.
+    /// Those for which the light is provably visible as a whole and was replaced by a point, alone or in a cluster.
     pub together: u64,
-    /// How many such points were taken; all other lights were left out, within the stated bound.
+    /// The number of these points. All other lights were left out, within the stated bound.
     pub nodes: u64,
 }
 
-/// Counts of one tile.
+/// The statistics of one tile.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Counts {
     pub camera_rays: u64,
@@ -84,17 +84,17 @@ pub(crate) struct Counts {
     pub closed_form: u64,
     pub batches: u64,
     pub batched_points: u64,
-    /// Camera rays that were asked: not those of places where it is proved what they would meet.
+    /// Camera rays that were traced: not those of pixels that provably see one surface.
     pub looks: u64,
-    /// Points of lights that were asked one by one, of lights that are integrated.
+    /// Points of integrated lights that were sampled.
     pub points: u64,
     pub lights: LightCounts,
-    /// Shadow rays after which the caller is asked whether to go on.
+    /// The number of shadow rays at which `go_on` is called again.
     pub next_question: u64,
 }
 
 impl Counts {
-    /// What is told of it.
+    /// The part of them that callers get.
     pub fn stats(&self, simd: SimdLevel, threads: usize) -> RenderStats {
         let Counts { camera_rays, shadow_rays, shadow_rays_skipped, visibility, closed_form, lights, .. } = *self;
         let Counts { batches, batched_points, .. } = *self;
@@ -116,7 +116,7 @@ impl Counts {
         }
     }
 
-    /// Counts a point whose visibility a batch classified.
+    /// Counts a shading point of a batch.
     pub fn note(&mut self, visibility: Visibility) {
         match visibility {
             Visibility::Partial => {}
@@ -125,7 +125,7 @@ impl Counts {
         }
     }
 
-    /// In the unit of [`Heat`].
+    /// The work so far, in the unit of [`Heat`].
     pub fn work(&self) -> f32 {
         let rays = self.looks + (self.shadow_rays - self.shadow_rays_skipped) + self.visibility.traced + self.points;
         let places = self.visibility.classes.iter().sum::<u64>() + self.closed_form;

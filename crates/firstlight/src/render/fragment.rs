@@ -1,445 +1,318 @@
-//! One surface in one pixel, and what of it wants light: its middle, the middles of its quadrants, its camera rays.
+//! Fragments: the part of one surface in one pixel, and the shading points that represent it, at three rates: one for
+//! the fragment, one for each quadrant of the pixel, one for each camera ray.
 
 use std::ops::Range;
 
-use arrayvec::ArrayVec;
-
-use super::solo::{Candidate, SquareBsdf};
-use super::square::Square;
-use crate::color::Rgb;
-use crate::film::hits::camera_ray;
+use super::visible_shape::{MeanBsdf, VisibleShape};
 use crate::ids::SurfaceId;
 use crate::integrate::TOLERANCE;
-use crate::material::{Bsdf, Colors, Lobe, Material, ShadingPoint};
-use crate::math::{DVec3, ErrorBound, Ray, Vec3};
+use crate::material::{Bsdf, Colors, Material, ShadingPoint};
+use crate::math::{DVec3, Ray, Vec3};
 use crate::scene::Scene;
-use crate::shape::RayDifferential;
 
-/// How far colours of some rays differ, channel by channel.
-pub(crate) type Contrast = Colors;
-
-/// Fragments of so few rays are lit at each.
+/// Fragments of at most so many rays have no quadrants.
 const FEW_RAYS: usize = 4;
 
-/// A camera ray and what it meets.
+/// The hit of a camera ray and a surface.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct RayHit {
-    pub ray: Ray,
-    pub t: f64,
-    /// Column and row in its pixel.
+pub(crate) struct RayPoint {
+    /// The shape; `None` if it is in the trees.
+    pub shape: Option<VisibleShape>,
+    pub point: ShadingPoint,
+    /// Column and row in the pixel of the ray.
     pub at: [u16; 2],
 }
 
-/// What a camera ray sees of what lies in trees.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Member {
-    pub point: ShadingPoint,
-    /// Column and row in its pixel.
-    at: [u16; 2],
+/// The number of shading points of a fragment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum ShadingRate {
+    Fragment,
+    Quadrant,
+    Ray,
 }
 
 /// A surface in a pixel.
 #[derive(Clone, Debug)]
 pub(crate) struct Fragment {
+    /// The number of its pixel among those with fragments.
     pub pixel: u32,
-    /// Its shape; `None` for what lies in trees.
-    pub of: Option<Candidate>,
+    /// Its shape; `None` if it is in the trees.
+    shape: Option<VisibleShape>,
     pub surface: SurfaceId,
-    /// Its material; the colours are the means over its rays.
-    pub bsdf: Bsdf,
-    /// How many of the pixel's rays see it.
+    /// The mean of the materials of its rays.
+    pub mean: MeanBsdf,
+    /// The number of rays of the pixel that hit it.
     pub count: u32,
-    /// They among all of the cell, or what they see among all that is in trees, none while nobody needs them.
-    pub rays: Range<usize>,
-    /// The materials of rays that meet a shape, if they are not all the same.
-    bsdfs: Option<Range<usize>>,
-    /// Whether the materials of rays differ, whether they differ in more than colours, and how far those differ.
-    pub is_textured: bool,
-    pub uneven: bool,
-    pub contrast: Contrast,
-    /// The share of a pixel by which its errors are judged.
+    /// The share of the pixel by which its errors are judged.
     pub share: f32,
-    /// Its middle among all places of the cell, if that may stand for all of it.
-    pub middle: Option<u32>,
-    /// Its quadrants among all of the cell, once somebody asks: none where it is lit at each ray.
+    /// Its center among [`Fragments::points`]; none if that cannot represent it.
+    pub center: Range<usize>,
+    /// Its quadrants among them, once they are computed: none if it is to be lit at each ray.
     quadrants: Option<Range<usize>>,
-}
-
-/// The part of a fragment in a quarter of its pixel.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Quadrant {
-    pub place: u32,
-    pub rays: u32,
-    pub contrast: Contrast,
-}
-
-/// The materials that have no textures, in numbers.
-pub(crate) struct PlainMaterials(Vec<Option<Bsdf>>);
-
-impl PlainMaterials {
-    pub fn new(scene: &Scene) -> Self {
-        PlainMaterials(scene.materials.iter().map(Material::plain_bsdf).collect())
-    }
-
-    /// That of a shape, if it has no textures.
-    pub fn get(&self, scene: &Scene, of: Candidate) -> Option<Bsdf> {
-        if let Candidate::Facet(facet) = of
-            && scene.geometry.has_colors(facet)
-        {
-            return None;
-        }
-        let surface = scene.geometry.surfaces.get(of.surface(scene).index())?;
-        self.0[surface.material?.index()]
-    }
+    /// Its rays among [`Fragments::rays`], once they are traced.
+    pub rays: Range<usize>,
 }
 
 /// The fragments of a cell.
 pub(crate) struct Fragments {
-    pub plain: PlainMaterials,
-    /// Whether the middle stands for rays of different colours, by their mean.
+    /// The materials without textures.
+    plain: Vec<Option<Bsdf>>,
+    /// Whether a center may represent rays of different colours by their mean.
     by_means: bool,
     pub all: Vec<Fragment>,
-    rays: Vec<RayHit>,
-    members: Vec<Member>,
-    bsdfs: Vec<Bsdf>,
-    quadrants: Vec<Quadrant>,
-    /// The middles of fragments and of quadrants.
-    pub places: Vec<ShadingPoint>,
+    /// The shading points of camera rays, and their columns and rows in their pixels.
+    pub rays: Vec<ShadingPoint>,
+    at: Vec<[u16; 2]>,
+    /// The centers of fragments and of quadrants; the number of rays and the contrast of colours of each.
+    pub points: Vec<ShadingPoint>,
+    parts: Vec<(u32, Colors)>,
 }
 
 impl Fragment {
-    /// How many of the pixel's rays see it.
-    pub fn count(&self) -> usize {
-        self.count as usize
+    /// Its shading points of a rate, as the numbers of [`Fragments::points_of`].
+    pub fn range(&self, rate: ShadingRate) -> Range<usize> {
+        match rate {
+            ShadingRate::Fragment => self.center.clone(),
+            ShadingRate::Quadrant => self.quadrants.clone().unwrap_or_default(),
+            ShadingRate::Ray => self.rays.clone(),
+        }
     }
 }
 
 impl Fragments {
     pub fn new(scene: &Scene, by_means: bool) -> Self {
         Fragments {
-            plain: PlainMaterials::new(scene),
+            plain: scene.materials.iter().map(Material::plain_bsdf).collect(),
             by_means,
             all: Vec::new(),
             rays: Vec::new(),
-            members: Vec::new(),
-            bsdfs: Vec::new(),
-            quadrants: Vec::new(),
-            places: Vec::new(),
+            at: Vec::new(),
+            points: Vec::new(),
+            parts: Vec::new(),
         }
     }
 
     pub fn clear(&mut self) {
         self.all.clear();
         self.rays.clear();
-        self.members.clear();
-        self.bsdfs.clear();
-        self.quadrants.clear();
-        self.places.clear();
+        self.at.clear();
+        self.points.clear();
+        self.parts.clear();
     }
 
-    /// Adds what some rays of pixel (`i`, `j`), number `pixel` of its cell, see, which all meet one shape. `share` is
-    /// that of the pixel by which errors are judged.
-    pub fn add(
-        &mut self,
-        scene: &Scene,
-        pixel: u32,
-        [i, j]: [u32; 2],
-        of: Candidate,
-        rays: impl Iterator<Item = RayHit>,
-        share: impl Fn(usize) -> f32,
-    ) {
-        let n = scene.antialiasing;
-        let first = self.rays.len();
-        self.rays.extend(rays);
-        let all = std::mem::take(&mut self.rays);
-        let rays = &all[first..];
-        let share = share(rays.len());
-        let (bsdf, even) = self.material(scene, [i, j], of, rays);
-        let bsdfs = (!even).then(|| {
-            let first = self.bsdfs.len();
-            let of_ray = |ray: &RayHit| {
-                let [x, y] = ray.on_film(n, [i, j]);
-                of.bsdf(scene, ray, &camera_ray(scene, x, y).1)
-            };
-            self.bsdfs.extend(rays.iter().map(of_ray));
-            first..self.bsdfs.len()
-        });
-        let mean = match &bsdfs {
-            None => MeanBsdf { bsdf, contrast: Contrast::default(), uneven: false },
-            Some(range) => MeanBsdf::of(self.bsdfs[range.clone()].iter()),
-        };
-        let middle = match rays {
-            [ray] => Some(of.point(scene, &ray.ray, ray.t, &mean.bsdf)),
-            _ if self.has_no_middle(&mean) => None,
-            _ => Some(middle(scene, of, &mean.bsdf, rays.iter())),
-        };
-        let middle = middle.map(|point| self.add_middle(point, share));
-        self.all.push(Fragment {
-            pixel,
-            of: Some(of),
-            surface: of.surface(scene),
-            bsdf: mean.bsdf,
-            count: (all.len() - first) as u32,
-            rays: first..all.len(),
-            is_textured: bsdfs.is_some(),
-            bsdfs,
-            uneven: mean.uneven,
-            contrast: mean.contrast,
-            share,
-            middle,
-            quadrants: None,
-        });
-        self.rays = all;
+    /// The material of a shape, if that has no textures.
+    pub fn plain_bsdf(&self, scene: &Scene, shape: VisibleShape) -> Option<Bsdf> {
+        if let VisibleShape::Facet(facet) = shape
+            && scene.geometry.has_colors(facet)
+        {
+            return None;
+        }
+        let surface = scene.geometry.surfaces.get(shape.surface(scene).index())?;
+        self.plain[surface.material?.index()]
     }
 
-    /// Whether no place stands for all rays of such materials.
-    fn has_no_middle(&self, mean: &MeanBsdf) -> bool {
-        mean.uneven || mean.contrast != Contrast::default() && !self.by_means
+    /// The shading points of a rate.
+    pub fn points_of(&self, rate: ShadingRate) -> &[ShadingPoint] {
+        if rate == ShadingRate::Ray { &self.rays } else { &self.points }
     }
 
-    /// Adds the middle of a fragment that fills a share of its pixel: which of all places it is.
-    fn add_middle(&mut self, point: ShadingPoint, share: f32) -> u32 {
-        // It tells nothing beside what is proved
-        self.places.push(ShadingPoint { share, most_motion: -1.0, ..point });
-        self.places.len() as u32 - 1
+    /// The number of rays that a shading point of a rate represents, and the contrast of their colours.
+    pub fn part(&self, rate: ShadingRate, point: usize) -> (u32, Colors) {
+        if rate == ShadingRate::Ray { (1, Colors::BLACK) } else { self.parts[point] }
     }
 
-    /// Adds what some rays of pixel (`i`, `j`), number `pixel` of its cell, see of what lies in trees: those of one
-    /// surface together, or each by itself. `share` as in [`add`](Self::add).
-    pub fn add_seen(
-        &mut self,
-        scene: &Scene,
-        pixel: u32,
-        at: [u32; 2],
-        seen: &mut Vec<Member>,
-        once: bool,
-        share: impl Fn(usize) -> f32,
-    ) {
-        while let Some(Member { point, .. }) = seen.first().copied() {
-            let first = self.members.len();
+    /// Adds fragments for some rays of a pixel, number `number` of those with fragments: one for each surface, or one
+    /// for each ray unless `grouped`.
+    pub fn add(&mut self, scene: &Scene, number: u32, at: [u32; 2], rays: &mut Vec<RayPoint>, grouped: bool) {
+        let all = (scene.antialiasing * scene.antialiasing) as f32;
+        while let Some(RayPoint { shape, point, .. }) = rays.first().copied() {
+            let first = self.rays.len();
             let mut is_first = true;
-            let is_alike =
-                |member: &mut Member| std::mem::take(&mut is_first) || once && is_one_surface(&point, &member.point);
-            self.members.extend(seen.extract_if(.., is_alike));
-            let members = &self.members[first..];
-            let count = members.len();
-            let bsdfs = members.iter().map(|member| &member.point.bsdf);
-            let is_textured = bsdfs.clone().any(|other| *other != point.bsdf);
-            let mean = match is_textured {
-                false => MeanBsdf { bsdf: point.bsdf, contrast: Contrast::default(), uneven: false },
-                true => MeanBsdf::of(bsdfs),
+            let is_alike = |ray: &mut RayPoint| {
+                let is_same = || ray.shape == shape && (shape.is_some() || is_one_surface(&point, &ray.point));
+                std::mem::take(&mut is_first) || grouped && is_same()
             };
-            let share = share(count);
-            let middle = match self.has_no_middle(&mean) {
-                true => None,
-                false => seen_middle(scene, at, &mean.bsdf, members.iter()),
-            };
-            let middle = middle.map(|point| self.add_middle(point, share));
-            self.all.push(Fragment {
-                pixel,
-                of: None,
-                surface: point.surface,
-                bsdf: mean.bsdf,
-                count: count as u32,
-                rays: first..self.members.len(),
-                is_textured,
-                bsdfs: None,
-                uneven: mean.uneven,
-                contrast: mean.contrast,
-                share,
-                middle,
-                quadrants: None,
-            });
+            for RayPoint { point, at, .. } in rays.extract_if(.., is_alike) {
+                self.rays.push(point);
+                self.at.push(at);
+            }
+            let share = if grouped { (self.rays.len() - first) as f32 / all } else { 1.0 };
+            self.push(scene, number, at, shape, first, share);
         }
     }
 
-    /// Adds a pixel that is proved to see one shape of one material, from the middles of its quadrants alone; `false`
-    /// if it is to be asked for its rays.
-    pub fn add_whole(&mut self, scene: &Scene, pixel: u32, [i, j]: [u32; 2], of: Candidate, bsdf: Bsdf) -> bool {
+    /// Adds a fragment of the rays from number `first` on.
+    fn push(&mut self, scene: &Scene, pixel: u32, at: [u32; 2], shape: Option<VisibleShape>, first: usize, share: f32) {
+        let rays = first..self.rays.len();
+        let part_of_points = 1.0 / rays.len() as f32;
+        for point in &mut self.rays[rays.clone()] {
+            (point.share, point.part_of_points) = (share, part_of_points);
+        }
+        let bsdfs = self.rays[rays.clone()].iter().map(|ray| ray.bsdf);
+        let mean = MeanBsdf::of(bsdfs).expect("a fragment has a ray");
+        let has_center = !mean.lobes_differ && (mean.contrast == Colors::BLACK || self.by_means);
+        let center = if has_center { self.center(scene, at, shape, &mean.bsdf, rays.clone()) } else { None };
+        let points = self.points.len();
+        if let Some(center) = center {
+            // It is used only where the light is proved to vary little
+            let part_of_points = f32::INFINITY;
+            self.points.push(ShadingPoint { share, most_motion: -1.0, part_of_points, ..center });
+            self.parts.push((rays.len() as u32, Colors::BLACK));
+        }
+        self.all.push(Fragment {
+            pixel,
+            shape,
+            surface: self.rays[first].surface,
+            mean,
+            count: rays.len() as u32,
+            share,
+            center: points..self.points.len(),
+            quadrants: None,
+            rays,
+        });
+    }
+
+    /// Adds a pixel that provably sees one shape of one material, by the centers of its quadrants alone; `false` if the
+    /// pixel has to be traced.
+    pub fn add_whole(&mut self, scene: &Scene, pixel: u32, [i, j]: [u32; 2], shape: VisibleShape, bsdf: Bsdf) -> bool {
         let n = scene.antialiasing;
         if n % 2 == 1 || (n * n) as usize <= FEW_RAYS {
             return false;
         }
-        let mut points = ArrayVec::<ShadingPoint, 4>::new();
+        let first = self.points.len();
         for [x, y] in [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]] {
             let (ray, _) = scene.camera.local_ray(i as f32 + x, j as f32 + y, 1.0);
-            match of.intersect(scene, &ray) {
-                Some(t) => points.push(of.point(scene, &ray, t, &bsdf)),
-                None => return false,
-            }
+            let Some(t) = shape.intersect(scene, &ray) else {
+                self.points.truncate(first);
+                return false;
+            };
+            self.points.push(shape.point(scene, &ray, t, &bsdf));
         }
-        // From the middle of a quadrant to the farthest of its rays, as a part of the way to that of the opposite one
+        let points = &mut self.points[first..];
+        // The distance from the center of a quadrant to its farthest ray, as a part of that to the opposite center
         let part = 0.5 - 1.0 / n as f32;
         let apart = |one: usize, other: usize| (points[one].p - points[other].p).length();
         let reach = part * apart(0, 3).max(apart(1, 2));
-        let turn = reach * of.curvature(scene);
-        let first = self.quadrants.len();
+        let turn = reach * shape.curvature(scene);
         for point in points {
-            let (place, rays) = (self.places.len() as u32, n * n / 4);
-            self.quadrants.push(Quadrant { place, rays, contrast: Contrast::default() });
-            let most_motion = TOLERANCE.motion;
-            self.places.push(ShadingPoint { reach, turn, most_motion, part_of_points: 0.25, ..point });
+            *point = ShadingPoint { reach, turn, most_motion: TOLERANCE.motion, part_of_points: 0.25, ..*point };
+            self.parts.push((n * n / 4, Colors::BLACK));
         }
-        let quadrants = Some(first..self.quadrants.len());
-        let (count, rays) = (n * n, 0..0);
         self.all.push(Fragment {
             pixel,
-            of: Some(of),
-            surface: of.surface(scene),
-            bsdf,
-            count,
-            rays,
-            is_textured: false,
-            bsdfs: None,
-            uneven: false,
-            contrast: Contrast::default(),
+            shape: Some(shape),
+            surface: shape.surface(scene),
+            mean: MeanBsdf::constant(bsdf),
+            count: n * n,
             share: 1.0,
-            middle: None,
-            quadrants,
+            center: first..first,
+            quadrants: Some(first..self.points.len()),
+            rays: 0..0,
         });
         true
     }
 
-    /// Finds where the rays of its pixel meet a fragment that was added whole. Where a rounding lets one miss, the last
-    /// that does not stands for it.
+    /// Computes the shading points of the rays of a fragment that was [added whole](Self::add_whole). Rays that miss it
+    /// by a rounding get the point of the last one that does not.
     pub fn trace(&mut self, scene: &Scene, fragment: usize, rays: &[Ray]) {
         let n = scene.antialiasing;
         let first = self.rays.len();
-        let of = self.all[fragment].of.expect("what lies in trees is traced at once");
+        let Fragment { shape, mean, .. } = &mut self.all[fragment];
+        let shape = shape.expect("fragments in the trees are traced at once");
         for (k, ray) in rays.iter().enumerate() {
-            let at = [k as u32 % n, k as u32 / n].map(|at| at as u16);
-            self.rays.extend(of.intersect(scene, ray).map(|t| RayHit { ray: *ray, t, at }));
+            if let Some(t) = shape.intersect(scene, ray) {
+                self.rays.push(shape.point(scene, ray, t, &mean.bsdf));
+                self.at.push([k as u32 % n, k as u32 / n].map(|at| at as u16));
+            }
         }
         if let Some(last) = self.rays[first..].last().copied() {
             self.rays.resize(first + rays.len(), last);
+            self.at.resize(first + rays.len(), *self.at.last().expect("each ray has one"));
         }
+        let part_of_points = 1.0 / (self.rays.len() - first) as f32;
+        self.rays[first..].iter_mut().for_each(|point| point.part_of_points = part_of_points);
         let fragment = &mut self.all[fragment];
         (fragment.rays, fragment.count) = (first..self.rays.len(), (self.rays.len() - first) as u32);
     }
 
-    /// The material in the middle of a pixel, and whether it is that of all its rays.
-    fn material(&self, scene: &Scene, [i, j]: [u32; 2], of: Candidate, rays: &[RayHit]) -> (Bsdf, bool) {
-        if let Some(plain) = self.plain.get(scene, of) {
-            return (plain, true);
-        }
-        if let [ray] = rays {
-            let n = scene.antialiasing;
-            let [x, y] = ray.on_film(n, [i, j]);
-            return (of.bsdf(scene, ray, &camera_ray(scene, x, y).1), true);
-        }
-        let (ray, whole) = scene.camera.local_ray(i as f32 + 0.5, j as f32 + 0.5, 1.0);
-        let is_seen = of.intersect(scene, &ray);
-        let middle = is_seen.map_or(rays[0], |t| RayHit { ray, t, at: [0; 2] });
-        let si = scene.local_surface(&middle.ray, &of.hit_at(scene, &middle.ray, middle.t), &whole);
-        let material = &scene.materials[si.material.index()];
-        let ends = rays.iter().map(|ray| ray.end().as_vec3());
-        let even = is_seen.is_some() && of.is_even_over(scene, &si, &middle.ray, middle.t, &whole, ends);
-        (material.bsdf(&si, &scene.textures), even)
-    }
-
-    /// Finds the parts of a fragment in the quarters of its pixel, `pixel` of the film.
+    /// Computes the quadrants of a fragment: its parts in the quarters of its pixel. There are none if they cannot
+    /// represent it.
     pub fn find_quadrants(&mut self, scene: &Scene, fragment: usize, pixel: [u32; 2]) {
         if self.all[fragment].quadrants.is_none() {
-            let first = self.quadrants.len();
-            if !self.add_quadrants(scene, fragment, pixel) {
-                self.quadrants.truncate(first);
+            let first = self.points.len();
+            if self.add_quadrants(scene, fragment, pixel).is_none() {
+                self.points.truncate(first);
+                self.parts.truncate(first);
             }
-            self.all[fragment].quadrants = Some(first..self.quadrants.len());
+            self.all[fragment].quadrants = Some(first..self.points.len());
         }
     }
 
-    /// Those that were found; none where it has to be lit at each ray.
-    pub fn quadrants(&self, fragment: &Fragment) -> &[Quadrant] {
-        fragment.quadrants.clone().map_or(&[], |range| &self.quadrants[range])
-    }
-
-    fn add_quadrants(&mut self, scene: &Scene, fragment: usize, pixel: [u32; 2]) -> bool {
-        let Fragment { of, bsdf, is_textured, rays, uneven, share, count, .. } = self.all[fragment].clone();
-        if uneven || count as usize <= FEW_RAYS {
-            return false;
+    fn add_quadrants(&mut self, scene: &Scene, fragment: usize, pixel: [u32; 2]) -> Option<()> {
+        let Fragment { shape, mean, ref rays, share, .. } = self.all[fragment];
+        let rays = rays.clone();
+        if mean.lobes_differ || rays.len() <= FEW_RAYS {
+            return None;
         }
         let half = scene.antialiasing.div_ceil(2) as u16;
-        for number in [[0, 0], [1, 0], [0, 1], [1, 1]] {
-            let is_in = |at: [u16; 2]| at.map(|at| at / half) == number;
-            let those = (0..rays.len()).filter(|k| is_in(self.ray_at(of, rays.start + k)));
-            let count = those.clone().count();
+        for quadrant in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+            let own = rays.clone().filter(|ray| self.at[*ray].map(|at| at / half) == quadrant);
+            let count = own.clone().count();
             if count == 0 {
                 continue;
             }
-            let mean = match is_textured {
-                false => MeanBsdf { bsdf, contrast: Contrast::default(), uneven: false },
-                true => MeanBsdf::of(those.map(|k| self.bsdf(&self.all[fragment], k))),
+            let mean = match mean.is_constant {
+                true => mean,
+                false => MeanBsdf::of(own.clone().map(|ray| self.rays[ray].bsdf))?,
             };
-            let point = match of {
-                Some(of) => {
-                    let rays = self.rays[rays.clone()].iter().filter(|ray| is_in(ray.at));
-                    Some(middle(scene, of, &mean.bsdf, rays))
-                }
-                None => {
-                    let members = self.members[rays.clone()].iter().filter(|member| is_in(member.at));
-                    seen_middle(scene, pixel, &mean.bsdf, members)
-                }
-            };
-            let Some(point) = point else { return false };
-            let (place, contrast) = (self.places.len() as u32, mean.contrast);
-            self.quadrants.push(Quadrant { place, rays: count as u32, contrast });
+            let point = self.center(scene, pixel, shape, &mean.bsdf, own)?;
             let part_of_points = count as f32 / rays.len() as f32;
-            self.places.push(ShadingPoint { share, most_motion: TOLERANCE.motion, part_of_points, ..point });
+            self.points.push(ShadingPoint { share, most_motion: TOLERANCE.motion, part_of_points, ..point });
+            self.parts.push((count as u32, mean.contrast));
         }
-        true
+        Some(())
     }
 
-    /// Where in its pixel a ray is, by its number among all of the cell.
-    fn ray_at(&self, of: Option<Candidate>, ray: usize) -> [u16; 2] {
-        match of {
-            Some(_) => self.rays[ray].at,
-            None => self.members[ray].at,
-        }
-    }
-
-    /// Where a ray of a fragment, its `k`-th, wants light.
-    pub fn place(&self, scene: &Scene, fragment: &Fragment, k: usize) -> ShadingPoint {
-        let ray = fragment.rays.start + k;
-        let point = match fragment.of {
-            Some(of) => of.point(scene, &self.rays[ray].ray, self.rays[ray].t, self.bsdf(fragment, k)),
-            None => self.members[ray].point,
-        };
-        ShadingPoint { share: fragment.share, part_of_points: 1.0 / fragment.count() as f32, ..point }
-    }
-
-    /// The material that a ray of a fragment sees.
-    fn bsdf<'b>(&'b self, fragment: &'b Fragment, ray: usize) -> &'b Bsdf {
-        match (&fragment.bsdfs, fragment.of) {
-            (Some(range), _) => &self.bsdfs[range.start + ray],
-            (None, Some(_)) => &fragment.bsdf,
-            (None, None) => &self.members[fragment.rays.start + ray].point.bsdf,
+    /// The center of some rays of a pixel that hit one surface, with its reach to their hits; `None` if that cannot
+    /// represent them.
+    fn center(
+        &self,
+        scene: &Scene,
+        pixel: [u32; 2],
+        shape: Option<VisibleShape>,
+        bsdf: &Bsdf,
+        rays: impl Iterator<Item = usize> + Clone,
+    ) -> Option<ShadingPoint> {
+        let points = rays.clone().map(|ray| &self.rays[ray]);
+        let mut rest = points.clone();
+        match (rest.next(), rest.next(), shape) {
+            (Some(alone), None, _) => Some(*alone),
+            (.., Some(shape)) => Some(center_of_shape(scene, shape, bsdf, points)),
+            (.., None) => center_in_trees(scene, pixel, bsdf, rays.map(|ray| self.at[ray]), points),
         }
     }
 }
 
-/// The middle of what some rays see of a shape, with its reach to their ends.
-fn middle<'a>(
+/// The center of some shading points on a shape.
+fn center_of_shape<'a>(
     scene: &Scene,
-    of: Candidate,
+    shape: VisibleShape,
     bsdf: &Bsdf,
-    rays: impl Iterator<Item = &'a RayHit> + Clone,
+    points: impl Iterator<Item = &'a ShadingPoint> + Clone,
 ) -> ShadingPoint {
-    let (mut count, mut q, mut d) = (0.0, DVec3::ZERO, Vec3::ZERO);
-    for ray in rays.clone() {
-        (count, q, d) = (count + 1.0, q + ray.end(), d + ray.ray.d);
+    let (mut count, mut q, mut wo) = (0.0, DVec3::ZERO, Vec3::ZERO);
+    for point in points.clone() {
+        (count, q, wo) = (count + 1.0, q + point.p.as_dvec3(), wo + point.wo);
     }
-    // In the middle of what they see, not of the rays: on a rim the surface runs away
-    let mut point = of.point_near(scene, q / count, -d.normalize(), bsdf);
-    let mut reach2 = 0.0f32;
-    for ray in rays {
-        reach2 = reach2.max((ray.end().as_vec3() - point.p).length_squared());
-    }
-    point.reach = reach2.sqrt();
-    point.turn = point.reach * of.curvature(scene);
-    point
+    // The mean of the hits: that of the rays may miss the shape at a rim
+    let mut center = shape.point_near(scene, q / count, wo.normalize(), bsdf);
+    let reach2 = points.fold(0.0f32, |reach2, point| reach2.max((point.p - center.p).length_squared()));
+    center.reach = reach2.sqrt();
+    center.turn = center.reach * shape.curvature(scene);
+    center
 }
 
-/// Whether two places that camera rays see are of one surface, which may be lit as one.
+/// Whether two shading points are on one surface, without a fold between them.
 pub(crate) fn is_one_surface(one: &ShadingPoint, other: &ShadingPoint) -> bool {
     if one.surface != other.surface || !(one.ns.dot(other.ns) > 0.0) {
         return false;
@@ -450,222 +323,39 @@ pub(crate) fn is_one_surface(one: &ShadingPoint, other: &ShadingPoint) -> bool {
     off <= 0.5 * apart.length()
 }
 
-/// The middle of what some rays of pixel (`i`, `j`) see of a surface in trees, with its reach to their ends; `None` if
-/// something else is there, or if the mean of normals is farther than `TOLERANCE.even` from that in the middle.
-fn seen_middle<'a>(
+/// The center of some rays at the places `at` of pixel (`i`, `j`) that hit a surface in the trees at `points`; `None`
+/// if the ray through the mean of the places hits another surface, or if the mean of the normals differs by more than
+/// `TOLERANCE.even` from the normal there.
+fn center_in_trees<'a>(
     scene: &Scene,
     [i, j]: [u32; 2],
     bsdf: &Bsdf,
-    members: impl Iterator<Item = &'a Member> + Clone,
+    at: impl Iterator<Item = [u16; 2]>,
+    points: impl Iterator<Item = &'a ShadingPoint> + Clone,
 ) -> Option<ShadingPoint> {
     let n = scene.antialiasing;
     let (mut count, mut x, mut y) = (0.0f32, 0.0, 0.0);
-    for member in members.clone() {
-        (count, x, y) = (count + 1.0, x + f32::from(member.at[0]), y + f32::from(member.at[1]));
+    for at in at {
+        (count, x, y) = (count + 1.0, x + f32::from(at[0]), y + f32::from(at[1]));
     }
-    let first = members.clone().next()?.point;
-    if count == 1.0 {
-        return Some(first);
-    }
-    let at = |from: u32, sum: f32| from as f32 + (sum / count + 0.5) / n as f32;
-    let (ray, differential) = scene.camera.local_ray(at(i, x), at(j, y), 1.0 / n as f32);
+    let first = points.clone().next()?;
+    let mean = |from: u32, sum: f32| from as f32 + (sum / count + 0.5) / n as f32;
+    let (ray, differential) = scene.camera.local_ray(mean(i, x), mean(j, y), 1.0 / n as f32);
     let hit = scene.intersect_local(&ray).filter(|hit| hit.surface == first.surface)?;
     let si = scene.local_surface(&ray, &hit, &differential);
-    let mut point = ShadingPoint::of(&si, bsdf, scene.ambient);
-    if !is_one_surface(&point, &first) {
+    let mut center = ShadingPoint::of(&si, bsdf, scene.ambient);
+    if !is_one_surface(&center, first) {
         return None;
     }
     let mut normals = Vec3::ZERO;
-    for Member { point: other, .. } in members {
-        point.reach = point.reach.max((other.p - point.p).length());
-        let turn = (other.ns - point.ns).length().max((other.horizon - point.horizon).length());
-        // Steps are not flat, though no normal turns
-        let off = (other.p - point.p).dot(point.horizon).abs();
-        let steps = off > point.horizon.abs().dot(other.error.0 + point.error.0);
-        point.turn = point.turn.max(turn).max(if steps { f32::MIN_POSITIVE } else { 0.0 });
-        normals += other.ns - point.ns;
+    for point in points {
+        center.reach = center.reach.max((point.p - center.p).length());
+        let turn = (point.ns - center.ns).length().max((point.horizon - center.horizon).length());
+        // A step between parallel faces turns no normal
+        let off = (point.p - center.p).dot(center.horizon).abs();
+        let steps = off > center.horizon.abs().dot(point.error.0 + center.error.0);
+        center.turn = center.turn.max(turn).max(if steps { f32::MIN_POSITIVE } else { 0.0 });
+        normals += point.ns - center.ns;
     }
-    (normals.length() <= TOLERANCE.even * count).then_some(point)
-}
-
-impl Member {
-    /// What the ray at `at` of its pixel sees.
-    pub fn new(point: ShadingPoint, at: [u16; 2]) -> Member {
-        Member { point, at }
-    }
-}
-
-impl RayHit {
-    /// Where it ends.
-    fn end(&self) -> DVec3 {
-        self.ray.o.as_dvec3() + self.ray.d.as_dvec3() * self.t
-    }
-
-    /// Which ray of the film it is, in a pixel with n x n.
-    fn on_film(&self, n: u32, [i, j]: [u32; 2]) -> [u32; 2] {
-        [i * n + u32::from(self.at[0]), j * n + u32::from(self.at[1])]
-    }
-}
-
-impl Candidate {
-    /// Where a ray that meets it at `t` wants light.
-    #[inline(always)]
-    pub fn point(self, scene: &Scene, ray: &Ray, t: f64, bsdf: &Bsdf) -> ShadingPoint {
-        self.turned(
-            scene,
-            match self {
-                Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.place(ray, t),
-                Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.place(ray, t),
-                Candidate::Plane(_) | Candidate::Facet(_) => return self.surface_point(scene, ray, t, bsdf),
-                Candidate::Light(_) | Candidate::Trees => unreachable!("it has no material of its own"),
-            },
-            -ray.d,
-            bsdf,
-        )
-    }
-
-    /// The same for the point of it that is nearest to `q`, seen along `wo`; `q` is next to it on what is flat.
-    fn point_near(self, scene: &Scene, q: DVec3, wo: Vec3, bsdf: &Bsdf) -> ShadingPoint {
-        self.turned(
-            scene,
-            match self {
-                Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.nearest_place(q),
-                Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.nearest_place(q),
-                Candidate::Plane(_) | Candidate::Facet(_) => {
-                    return self.surface_point(scene, &Ray { o: q.as_vec3(), d: -wo }, 0.0, bsdf);
-                }
-                Candidate::Light(_) | Candidate::Trees => unreachable!("it has no material of its own"),
-            },
-            wo,
-            bsdf,
-        )
-    }
-
-    /// A place with its normal on the viewer's side.
-    #[inline(always)]
-    fn turned(
-        self,
-        scene: &Scene,
-        (p, error, normal): (Vec3, ErrorBound, Vec3),
-        wo: Vec3,
-        bsdf: &Bsdf,
-    ) -> ShadingPoint {
-        let error = error.widened(scene.geometry.rounding);
-        let (n, surface) = (if normal.dot(wo) < 0.0 { -normal } else { normal }, self.surface(scene));
-        let receives_shadow = scene.geometry.surfaces[surface.index()].receives_shadow;
-        let base = bsdf.base(scene.ambient);
-        ShadingPoint { surface, receives_shadow, base, ..ShadingPoint::new(p, error, n, wo, bsdf) }
-    }
-
-    /// The same of what is placed.
-    fn surface_point(self, scene: &Scene, ray: &Ray, t: f64, bsdf: &Bsdf) -> ShadingPoint {
-        let si = scene.local_surface(ray, &self.hit_at(scene, ray, t), &RayDifferential::default());
-        ShadingPoint::of(&si, bsdf, scene.ambient)
-    }
-
-    /// The material that a ray sees which meets it.
-    fn bsdf(self, scene: &Scene, ray: &RayHit, differential: &RayDifferential) -> Bsdf {
-        let si = scene.local_surface(&ray.ray, &self.hit_at(scene, &ray.ray, ray.t), differential);
-        scene.materials[si.material.index()].bsdf(&si, &scene.textures)
-    }
-
-    /// The mean material over the rays of a pixel that sees only this; `None` where more than colours change.
-    pub fn mean(self, scene: &Scene, at: [u32; 2]) -> Option<(Bsdf, Contrast)> {
-        if let Some(whole) = self.of_square(scene, Square { x: at[0], y: at[1], side: 1 }) {
-            if whole.is_even {
-                return Some((whole.bsdf, Contrast::default()));
-            }
-            if let Some(mean) = self.mean_of_area(scene, at, &whole) {
-                return Some(mean);
-            }
-        }
-        let mean = self.mean_of_parts(scene, at, scene.antialiasing)?;
-        (!mean.uneven).then_some((mean.bsdf, mean.contrast))
-    }
-
-    /// The same where textures tell the mean over any area: from the `whole` pixel, if it is a parallelogram on the
-    /// surface, or nearly so, else from its quarters, if it says the same.
-    fn mean_of_area(self, scene: &Scene, at: [u32; 2], whole: &SquareBsdf) -> Option<(Bsdf, Contrast)> {
-        let surface = &scene.geometry.surfaces[self.surface(scene).index()];
-        let (contrast, ambient) = scene.materials[surface.material?.index()].contrast(&scene.textures)?;
-        // At a rim neither the whole nor quarters are what they seem
-        if scene.antialiasing <= 2 || whole.growth == f32::INFINITY {
-            return None;
-        }
-        let is_within = |off: Rgb, mean: Rgb| {
-            let allowed = mean * TOLERANCE.same_mean;
-            off.r <= allowed.r && off.g <= allowed.g && off.b <= allowed.b
-        };
-        let SquareBsdf { bsdf, growth, .. } = *whole;
-        // An edge between two colours is off by an eighth of what the pixel grows, at most
-        let off = 0.125 * growth;
-        let is_within_by = |part: f32| {
-            let mut colors = contrast.0.into_iter().zip(bsdf.colors.0);
-            is_within(ambient * (off * part), bsdf.ambient)
-                && colors.all(|(contrast, mean)| is_within(contrast * (off * part), mean))
-        };
-        if is_within_by(1.0) {
-            return Some((bsdf, contrast));
-        }
-        let quarters = self.mean_of_parts(scene, at, 2)?;
-        // All of one colour, but beside an edge, which quarters can miss by a quarter of that
-        if quarters.contrast == Contrast::default() && !is_within_by(0.25) {
-            return None;
-        }
-        let is_same = |one: Rgb, other: Rgb| is_within((one + other * -1.0).map(f32::abs), other);
-        let is_same = is_same(bsdf.ambient, quarters.bsdf.ambient)
-            && bsdf.colors.0.into_iter().zip(quarters.bsdf.colors.0).all(|(one, other)| is_same(one, other));
-        // Rays differ by more than quarters, the means of some of them: by twice as much at most, along each axis
-        (is_same && !quarters.uneven).then_some((quarters.bsdf, quarters.contrast * 2.0))
-    }
-
-    /// The mean material over the n x n parts of a pixel that sees only this.
-    fn mean_of_parts(self, scene: &Scene, [i, j]: [u32; 2], n: u32) -> Option<MeanBsdf> {
-        let mut bsdfs = ArrayVec::<Bsdf, MAX_MEAN>::new();
-        for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
-            let middle = |from: u32, part: u32| from as f32 + (part as f32 + 0.5) / n as f32;
-            let (ray, differential) = scene.camera.local_ray(middle(i, column), middle(j, row), 1.0 / n as f32);
-            // It is proved that it meets it; a rounding may say otherwise
-            let Some(t) = self.intersect(scene, &ray) else { continue };
-            bsdfs.try_push(self.bsdf(scene, &RayHit { ray, t, at: [0; 2] }, &differential)).ok()?;
-        }
-        (!bsdfs.is_empty()).then(|| MeanBsdf::of(bsdfs.iter()))
-    }
-}
-
-/// The most rays whose mean is taken at once.
-const MAX_MEAN: usize = 64;
-
-/// The mean of some materials in numbers.
-struct MeanBsdf {
-    bsdf: Bsdf,
-    contrast: Contrast,
-    /// Whether highlights differ in more than colour.
-    uneven: bool,
-}
-
-impl MeanBsdf {
-    fn of<'a>(bsdfs: impl Iterator<Item = &'a Bsdf>) -> MeanBsdf {
-        let mut sum = Bsdf { colors: Colors::BLACK, ambient: Rgb::BLACK, lobe: Lobe::None };
-        let (mut count, mut uneven) = (0.0f32, false);
-        let infinite = Rgb::gray(f32::INFINITY);
-        let (mut least, mut most) = (Colors::BLACK.map(|_| infinite), Colors::BLACK);
-        for bsdf in bsdfs {
-            sum.colors += bsdf.colors;
-            sum.ambient += bsdf.ambient;
-            count += 1.0;
-            (least, most) = (least.min(bsdf.colors), most.max(bsdf.colors));
-            // Any ray that sees a highlight says what it is like
-            match sum.lobe.with(bsdf.lobe) {
-                Some(lobe) => sum.lobe = lobe,
-                None => uneven = true,
-            }
-        }
-        let inverse = 1.0 / count;
-        MeanBsdf {
-            bsdf: Bsdf { colors: sum.colors * inverse, ambient: sum.ambient * inverse, lobe: sum.lobe },
-            contrast: most + least * -1.0,
-            uneven,
-        }
-    }
+    (normals.length() <= TOLERANCE.even * count).then_some(center)
 }

@@ -176,7 +176,7 @@ fn partials<S: Simd>(v: f32x16<S>) -> LaneSum {
 }
 
 impl Lighting for Lanes {
-    fn look_around(&mut self, scene: &Scene, point: &ShadingPoint) {
+    fn set_receiver(&mut self, scene: &Scene, point: &ShadingPoint) {
         let listed = &scene.occluders;
         let spheres = listed.spheres.iter().map(|sphere| sphere.map(|shape| shape.shadow(point.p, point.error)));
         self.spheres.clear();

@@ -8,14 +8,15 @@
 //! [`cell`](cell/index.html) integrates lights, and lights a surface once where an error estimate allows it.
 
 mod cell;
+#[cfg(feature = "bench")]
+pub(crate) mod chosen_points;
 mod counts;
 mod cut;
 mod direct;
 mod fragment;
-#[cfg(feature = "bench")]
-pub(crate) mod given;
-mod grid;
+mod interpolation;
 mod lanes;
+mod lighting_grid;
 mod lights;
 mod listed_occluder_cache;
 mod many;
@@ -23,8 +24,9 @@ pub(crate) mod pixel;
 mod plain;
 mod pooled;
 mod shafts;
-mod solo;
 mod square;
+mod tile_frustum;
+mod visible_shape;
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
@@ -46,7 +48,7 @@ use crate::math::Ray;
 use crate::parallel;
 use crate::scene::Scene;
 use crate::visibility::Target;
-use cell::{CELL, Cells};
+use cell::{CELL, CellRenderer};
 pub(crate) use counts::Counts;
 use direct::DirectLighting;
 use lanes::Lanes;
@@ -122,7 +124,7 @@ fn expose(
     let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
     let by_shafts = every_ray && renderer == Renderer::Full;
     let targets = if by_shafts { Target::of_all(scene) } else { Vec::new() };
-    let spare: Mutex<Vec<Cells>> = Mutex::new(Vec::new());
+    let spare: Mutex<Vec<CellRenderer>> = Mutex::new(Vec::new());
     let render_one = |tile: &Tile| {
         if stop.load(Ordering::Relaxed) {
             return;
@@ -156,7 +158,7 @@ fn expose(
                 let used = spare.lock().expect("no thread panics while it holds a renderer").pop();
                 let mut cells = used.unwrap_or_else(|| {
                     let direct = DirectLighting::new(scene, &lights, token);
-                    Cells::new(scene, renderer.aa_mode(), direct, planes)
+                    CellRenderer::new(scene, renderer.aa_mode(), direct, planes)
                 });
                 let rendered = cells.render(film, &go_on);
                 spare.lock().expect("no thread panics while it holds a renderer").push(cells);

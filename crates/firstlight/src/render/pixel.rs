@@ -1,4 +1,5 @@
-//! One pixel: its camera rays, what they see, and how that becomes a colour.
+//! One pixel of the renderers that sample every light at every camera ray: its rays, their hits, and the sum of the
+//! light there.
 
 use std::ops::ControlFlow;
 
@@ -10,17 +11,18 @@ use crate::material::{Bsdf, MOMENTS, Moments, PerMoment, ShadingPoint};
 use crate::math::{LaneSum, Ray};
 use crate::scene::{Hit, Scene, TracedHit};
 
-/// How the light of one source is summed at one surface: the only thing in which the renderers differ.
+/// How the light of one source is summed at one surface: the only difference between those renderers.
 pub(crate) trait Lighting {
-    /// Looks around from a surface, once for all lights.
-    fn look_around(&mut self, scene: &Scene, point: &ShadingPoint);
+    /// Sets the receiver for calls of [`gather`](Self::gather).
+    fn set_receiver(&mut self, _scene: &Scene, _point: &ShadingPoint) {}
 
-    /// The sums over the points of light `index`, in the contract's order, of the weight times the cosine and of the
-    /// weight times the highlight, hidden points being 0. `point` is the one last looked around from.
+    /// The sums over the samples of light `index` at the receiver `point`, in the fixed order of
+    /// [`LaneSum`](crate::math::LaneSum), of the weight times the cosine and of the weight times the highlight;
+    /// occluded samples add 0.
     fn gather(&mut self, scene: &Scene, index: usize, point: &ShadingPoint, counts: &mut Counts) -> LobeSums;
 }
 
-/// What arrives from one light, before all colours.
+/// The moments of one light, as sums in the order of lanes.
 pub(crate) struct LobeSums(pub [LaneSum; MOMENTS]);
 
 impl LobeSums {
@@ -29,7 +31,7 @@ impl LobeSums {
     }
 }
 
-/// What a pixel's camera rays add up to, term by term.
+/// The sum over the camera rays of a pixel, term by term.
 pub(crate) struct PixelSum {
     terms: PixelTerms,
     /// In scene order.
@@ -46,8 +48,8 @@ impl PixelSum {
         self.lights.fill(LightTerm::BLACK);
     }
 
-    /// Sends the n x n camera rays of pixel (`i`, `j`), row by row, and adds what they see. `hit` says what the ray of
-    /// a column and a row ends at.
+    /// Adds the light of the n x n camera rays of pixel (`i`, `j`), row by row. `hit` returns the hit of the ray of a
+    /// column and a row.
     pub fn sample(
         &mut self,
         scene: &Scene,
@@ -75,14 +77,14 @@ impl PixelSum {
         ControlFlow::Continue(())
     }
 
-    /// Adds what a camera ray ends at, but for the light of lights: that of a surface is added by
-    /// [`light`](Self::light).
+    /// Adds the background, the emission or the ambient light of a hit. Returns the shading point of a surface, whose
+    /// other light is added by [`light`](Self::light).
     pub fn see(&mut self, scene: &Scene, seen: TracedHit) -> Option<ShadingPoint> {
         match seen {
             TracedHit::Background => self.terms.background += 1,
             TracedHit::Emission(radiance) => self.terms.emission.add(radiance, 1),
             TracedHit::Surface(si) => {
-                // Look the material's textures up
+                // Evaluate the textures of the material
                 let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
                 let point = ShadingPoint::of(&si, &bsdf, scene.ambient);
                 self.terms.ambient += point.base;
@@ -92,15 +94,15 @@ impl PixelSum {
         None
     }
 
-    /// Adds what light `index` sends to a surface: the totals of [`LobeSums`].
+    /// Adds the moments of light `index` at a surface: the totals of [`LobeSums`].
     #[inline(always)]
     pub fn light(&mut self, index: usize, bsdf: &Bsdf, moments: &Moments) {
         self.lights[index] += bsdf.colors.each(moments);
     }
 
-    /// Adds what each light sends.
+    /// Adds all lights at a shading point.
     fn add_lights(&mut self, scene: &Scene, point: &ShadingPoint, lighting: &mut impl Lighting, counts: &mut Counts) {
-        lighting.look_around(scene, point);
+        lighting.set_receiver(scene, point);
         let links = scene.geometry.lights_of(point.surface);
         for index in 0..scene.lights.len() {
             if !scene.geometry.links.contains(links, LightId(index as u32)) {
@@ -111,7 +113,7 @@ impl PixelSum {
         }
     }
 
-    /// Makes pixel `at` of `sums` the mean.
+    /// Stores the mean over the rays in pixel `at` of `sums`.
     pub fn resolve(&self, scene: &Scene, at: usize, sums: &mut TermSums) {
         let scales = scene.lights.iter().map(|light| light.scale);
         self.terms.resolve(scene, ScaledTerm::of_all(scales, &self.lights), at, sums);

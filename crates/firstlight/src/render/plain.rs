@@ -13,8 +13,6 @@ use crate::visibility::Viewpoint;
 pub(crate) struct Plain;
 
 impl Lighting for Plain {
-    fn look_around(&mut self, _: &Scene, _: &ShadingPoint) {}
-
     fn gather(&mut self, scene: &Scene, index: usize, point: &ShadingPoint, counts: &mut Counts) -> LobeSums {
         let facing = Facing::new(scene, index, point);
         let mut sums = [const { LaneSum::new() }; MOMENTS];

@@ -1,4 +1,4 @@
-//! Squares of pixels, halved again and again.
+//! Squares of pixels, the nodes of a quadtree over the film.
 
 /// A square of pixels, in coordinates of the film; it may reach beyond the film's edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,7 +15,7 @@ impl Square {
         [[0, 0], [side, 0], [0, side], [side, side]].map(|[x, y]| Square { x: self.x + x, y: self.y + y, side })
     }
 
-    /// Those of them that a film of `size` pixels has a part of.
+    /// The quarters that overlap a film of `size` pixels.
     pub fn quarters_on(self, size: [u32; 2]) -> impl DoubleEndedIterator<Item = Square> {
         self.quarters().into_iter().filter(move |quarter| quarter.x < size[0] && quarter.y < size[1])
     }
@@ -24,5 +24,10 @@ impl Square {
     pub fn pixels(self) -> impl Iterator<Item = [u32; 2]> {
         let across = self.x..self.x + self.side;
         (self.y..self.y + self.side).flat_map(move |y| across.clone().map(move |x| [x, y]))
+    }
+
+    /// The number of one of its pixels, row by row.
+    pub fn number(self, [i, j]: [u32; 2]) -> usize {
+        ((j - self.y) * self.side + i - self.x) as usize
     }
 }

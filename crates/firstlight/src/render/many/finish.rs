@@ -72,7 +72,7 @@ impl<'a> Many<'a> {
             }
             lights.tolerate(TOLERANCE.integrals / (uncertain.len() as f32).sqrt());
             rays.clear();
-            patch.for_each(scene, fragments, |point| rays.push(point));
+            patch.for_each(fragments, |point| rays.push(point));
             for term in &uncertain {
                 let Some(i) = term.single else {
                     for point in &rays {

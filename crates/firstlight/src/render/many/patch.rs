@@ -2,7 +2,7 @@
 
 use crate::material::ShadingPoint;
 use crate::render::cell::CELL;
-use crate::render::fragment::{Fragments, is_one_surface};
+use crate::render::fragment::{Fragment, Fragments, is_one_surface};
 use crate::render::pooled::salt;
 use crate::scene::Scene;
 
@@ -62,16 +62,13 @@ impl Patch {
         fragment: usize,
         pixel: u32,
     ) -> impl Iterator<Item = Patch> + 'f {
-        let of = &fragments.all[fragment];
-        let rays = scene.antialiasing * scene.antialiasing;
-        let middle = of.middle.map(|place| Patch {
-            count: of.count,
-            is_whole: of.count == rays,
-            ..Patch::new(fragments.places[place as usize])
-        });
-        let alone = if middle.is_some() { 0 } else { of.rays.len() };
-        let each = (0..alone).map(move |k| Patch::new(fragments.place(scene, of, k)));
-        middle.into_iter().chain(each).map(move |patch| Patch { pixel, fragment: fragment as u32, ..patch })
+        let Fragment { center, rays, count, .. } = &fragments.all[fragment];
+        let is_whole = *count == scene.antialiasing * scene.antialiasing;
+        let center = fragments.points[center.clone()].iter();
+        let center = center.map(move |point| Patch { count: *count, is_whole, ..Patch::new(*point) });
+        let alone = if center.len() > 0 { 0..0 } else { rays.clone() };
+        let each = fragments.rays[alone].iter().map(|point| Patch::new(*point));
+        center.chain(each).map(move |patch| Patch { pixel, fragment: fragment as u32, ..patch })
     }
 
     /// Where it is in the cell: column and row.
@@ -96,13 +93,11 @@ impl Patch {
     }
 
     /// Calls `each` with the shading point of every ray of it.
-    pub fn for_each(&self, scene: &Scene, fragments: &Fragments, mut each: impl FnMut(ShadingPoint)) {
+    pub fn for_each(&self, fragments: &Fragments, mut each: impl FnMut(ShadingPoint)) {
         if self.point.reach == 0.0 && self.count == 1 {
             return each(self.point);
         }
-        let of = &fragments.all[self.fragment as usize];
-        for k in 0..of.rays.len() {
-            each(fragments.place(scene, of, k));
-        }
+        let rays = fragments.all[self.fragment as usize].rays.clone();
+        fragments.rays[rays].iter().for_each(|point| each(*point));
     }
 }

@@ -1,5 +1,5 @@
-//! The plain renderer with other points: the same light, point by point, but where on the lights they lie is somebody
-//! else's choice. Verification asks for it where equal shares of a light's area would take too many of them.
+//! The plain renderer with light points that the caller chooses, for verification: adaptive points need far fewer than
+//! equal parts of a light's area.
 
 use super::Counts;
 use super::pixel::{Lighting, LobeSums};
@@ -9,36 +9,34 @@ use crate::material::{MOMENTS, ShadingPoint};
 use crate::math::LaneSum;
 use crate::scene::Scene;
 
-/// A point of an area light: of the unit square that stands for it, equal areas for equal areas; and its share of the
-/// light, all of which is 1.
+/// A point of an area light, in area-preserving coordinates of the unit square, and its share of the light; the shares
+/// add up to 1.
 pub type LightPoint = ([f64; 2], f64);
 
-/// Writes points of an area light, given as its index, for a surface point; the function says where in the world, in
-/// metres, a point of the unit square lies.
+/// Appends points of the area light of an index for a surface point. The function maps a point of the unit square to
+/// the world, in metres.
 pub type ChoosePoints<'a> = dyn FnMut(usize, [f64; 3], &dyn Fn([f64; 2]) -> [f64; 3], &mut Vec<LightPoint>) + 'a;
 
-/// Light, by points that are given.
-pub(crate) struct Given<'a, 'b> {
+/// Lighting by chosen points.
+pub(crate) struct ChosenPoints<'a, 'b> {
     choose: &'a mut ChoosePoints<'b>,
     points: Vec<LightPoint>,
 }
 
-impl<'a, 'b> Given<'a, 'b> {
+impl<'a, 'b> ChosenPoints<'a, 'b> {
     pub fn new(choose: &'a mut ChoosePoints<'b>) -> Self {
-        Given { choose, points: Vec::new() }
+        ChosenPoints { choose, points: Vec::new() }
     }
 }
 
-impl Lighting for Given<'_, '_> {
-    fn look_around(&mut self, _: &Scene, _: &ShadingPoint) {}
-
+impl Lighting for ChosenPoints<'_, '_> {
     fn gather(&mut self, scene: &Scene, index: usize, point: &ShadingPoint, counts: &mut Counts) -> LobeSums {
         let facing = Facing::new(scene, index, point);
         let Some(area) = facing.light.area() else { return Plain.gather(scene, index, point, counts) };
         self.points.clear();
         let from = point.p.as_dvec3().to_array();
         (self.choose)(index, from, &|uv| area.position(uv), &mut self.points);
-        // A light's scale has its number of samples in it
+        // The scale of a light contains its number of samples
         let count = facing.light.samples() as f64;
         let mut sums = [0.0f64; MOMENTS];
         for (uv, share) in &self.points {
