@@ -429,7 +429,7 @@ impl<'a> DirectLighting<'a> {
         LightSampler { scene, level, area, emitter, target, sets }
     }
 
-    /// In radians: the rotation of directions over the footprint of a point, times the inverse of the width of its lobe.
+    /// In radians: the rotation of directions over the footprint of a point, over the width of its lobe.
     pub(super) fn turn(&self, point: &ShadingPoint, distance: f32) -> f32 {
         if point.reach == 0.0 {
             return 0.0;

@@ -46,8 +46,8 @@ impl<'a> Facing<'a> {
         Facing { scene, light, end, point, from: Viewpoint::of(point), cos_o, floor }
     }
 
-    /// The moments of one point of the light, in the direction `to`. `sample` computes its emission towards the surface;
-    /// `None` where nothing arrives.
+    /// The moments of one point of the light, in the direction `to`; `None` where nothing arrives. `sample` computes
+    /// its emission towards the surface.
     #[inline(always)]
     pub fn arriving(
         &self,

@@ -34,7 +34,8 @@ use finish::UncertainTerm;
 use patch::{Patch, Patches};
 use receivers::is_alike;
 
-/// Blocks whose cuts have more single lights are quartered.
+/// Blocks whose cuts have more single lights are quartered. On fairy lights half and twice as many: rms 0.080 and 0.052
+/// in place of 0.059 (64 pixels), time 0.93 and 1.15 (128 pixels).
 const MAX_SINGLE_LIGHTS: usize = 24;
 /// An error that exceeds every tolerance.
 const ANYTHING: f32 = 1e30;
