@@ -67,6 +67,12 @@ impl Rgb {
         Rgb::new(self.r.max(o.r), self.g.max(o.g), self.b.max(o.b))
     }
 
+    /// What a function makes of each channel.
+    #[inline(always)]
+    pub(crate) fn map(self, f: impl Fn(f32) -> f32) -> Rgb {
+        Rgb::new(f(self.r), f(self.g), f(self.b))
+    }
+
     /// Whether every channel is exactly 0.
     #[inline(always)]
     pub fn is_black(self) -> bool {

@@ -60,6 +60,8 @@ pub(crate) struct Tolerance {
     /// The length of a difference of unit normals: their deviation from linear variation or from their mean. Beyond it
     /// there is a crease.
     pub even: f32,
+    /// A part of the colour: the deviation from their mean of colours that are replaced by it.
+    pub same_mean: f32,
 
     // Rays of a pixel
     /// In display steps, the tolerance from which every second ray of a pixel samples an area light for all of them.
@@ -130,6 +132,7 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     quadrant_bend: 3.0,
     mingled: 0.4,
     even: 0.01,
+    same_mean: 0.004,
     half_of_rays: 16.0,
     first_points: 256.0,
     nearer: 4.0,

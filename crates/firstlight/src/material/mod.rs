@@ -138,6 +138,18 @@ impl Material {
         [self.diffuse.texture, self.specular.texture, self.shininess.texture, ambient] == [None; 4]
     }
 
+    /// How far its colours differ all over it, and that of its answer to ambient light, if they are the means over the
+    /// footprint of a surface, whatever its size, and nothing else changes.
+    pub(crate) fn contrast(&self, textures: &[Texture]) -> Option<(Colors, Rgb)> {
+        let contrast = |param: &Param<Rgb>| match param.texture {
+            None => Some(Rgb::BLACK),
+            Some(id) => Some(textures[id.index()].contrast()? * param.factor),
+        };
+        let [diffuse, specular] = [contrast(&self.diffuse)?, contrast(&self.specular)?];
+        let ambient = self.ambient.as_ref().map_or(Some(diffuse), contrast)?;
+        self.shininess.texture.is_none().then_some((PerMoment([diffuse, specular]), ambient))
+    }
+
     /// Whether it is the same all within a step of the footprint of a surface.
     pub(crate) fn is_even(&self, si: &SurfaceInteraction, textures: &[Texture]) -> bool {
         let even = |texture: Option<TextureId>| texture.is_none_or(|id| textures[id.index()].is_even(si));

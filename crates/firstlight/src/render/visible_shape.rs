@@ -3,8 +3,9 @@
 use std::f32::consts::PI;
 
 use super::square::Square;
-use crate::film::hits::camera_ray;
+use crate::color::Rgb;
 use crate::ids::SurfaceId;
+use crate::integrate::TOLERANCE;
 use crate::material::{Bsdf, Colors, ShadingPoint};
 use crate::math::{DVec3, ErrorBound, Facet, Ray, Vec3};
 use crate::scene::{At, Hit, Opacity, PlacedSpot, Scene};
@@ -23,6 +24,14 @@ pub(crate) enum VisibleShape {
     Light(u32),
     /// Everything in the trees together. It is bounded.
     Trees,
+}
+
+/// The material at the center of a square of pixels.
+struct SquareBsdf {
+    bsdf: Bsdf,
+    is_constant: bool,
+    /// The relative growth of a pixel's footprint over the square; `None` at a rim.
+    growth: Option<f32>,
 }
 
 /// The mean of the materials that some camera rays see.
@@ -199,32 +208,89 @@ impl VisibleShape {
 
     /// The material of a square of pixels that see only this shape, if it is constant there.
     pub fn constant_bsdf(self, scene: &Scene, square: Square) -> Option<Bsdf> {
+        self.square_bsdf(scene, square).and_then(|of| of.is_constant.then_some(of.bsdf))
+    }
+
+    /// The mean material over the camera rays of a pixel that sees only this shape; `None` where lobes differ.
+    pub fn mean_bsdf(self, scene: &Scene, pixel: [u32; 2]) -> Option<MeanBsdf> {
+        if let Some(whole) = self.square_bsdf(scene, Square { x: pixel[0], y: pixel[1], side: 1 }) {
+            if whole.is_constant {
+                return Some(MeanBsdf::constant(whole.bsdf));
+            }
+            if let Some(mean) = self.mean_of_textures(scene, pixel, &whole) {
+                return Some(mean);
+            }
+        }
+        self.mean_of_parts(scene, pixel, scene.antialiasing).filter(|mean| !mean.lobes_differ)
+    }
+
+    /// The material at the center of a square of pixels that see only this shape.
+    fn square_bsdf(self, scene: &Scene, square: Square) -> Option<SquareBsdf> {
         let center = |from: u32| from as f32 + 0.5 * square.side as f32;
         let (ray, differential) = scene.camera.local_ray(center(square.x), center(square.y), square.side as f32);
         let t = self.intersect(scene, &ray)?;
         let si = self.interaction(scene, &ray, t, &differential);
-        let growth = self.growth(scene, &si, &ray, t, &differential)?;
+        let growth = self.growth(scene, &si, &ray, t, &differential);
         let material = &scene.materials[si.material.index()];
-        let Footprint { dx, dy, edges } = si.footprint;
-        // Half a differential leads to the border
-        let part = (0.5 + 2.0 * growth).min(1.0);
-        let grown = SurfaceInteraction { footprint: Footprint { dx: dx * part, dy: dy * part, edges }, ..si };
-        material.is_even(&grown, &scene.textures).then(|| material.bsdf(&si, &scene.textures))
+        let is_constant = growth.is_some_and(|growth| {
+            let Footprint { dx, dy, edges } = si.footprint;
+            // Half a differential leads to the border
+            let part = (0.5 + 2.0 * growth).min(1.0);
+            let grown = SurfaceInteraction { footprint: Footprint { dx: dx * part, dy: dy * part, edges }, ..si };
+            material.is_even(&grown, &scene.textures)
+        });
+        Some(SquareBsdf { bsdf: material.bsdf(&si, &scene.textures), is_constant, growth })
     }
 
-    /// The mean material over the camera rays of a pixel that sees only this shape; `None` where lobes differ.
-    pub fn mean_bsdf(self, scene: &Scene, [x, y]: [u32; 2]) -> Option<MeanBsdf> {
-        let constant = self.constant_bsdf(scene, Square { x, y, side: 1 });
-        constant.map(MeanBsdf::constant).or_else(|| {
-            let n = scene.antialiasing;
-            let rays = (0..n).flat_map(|row| (0..n).map(move |column| camera_ray(scene, x * n + column, y * n + row)));
-            // All rays hit the shape but for roundings
-            let bsdf = |(ray, differential): (Ray, RayDifferential)| {
-                let t = self.intersect(scene, &ray)?;
-                Some(self.bsdf(scene, &ray, t, &differential))
-            };
-            MeanBsdf::of(rays.filter_map(bsdf)).filter(|mean| !mean.lobes_differ)
+    /// The mean material of a pixel by the exact means of textures over parallelograms: from its center, if the
+    /// footprint of the whole pixel is nearly a parallelogram, else from its quarters, if they agree with the center.
+    fn mean_of_textures(self, scene: &Scene, pixel: [u32; 2], whole: &SquareBsdf) -> Option<MeanBsdf> {
+        let surface = &scene.geometry.surfaces[self.surface(scene).index()];
+        let (contrast, ambient) = scene.materials[surface.material?.index()].contrast(&scene.textures)?;
+        // At a rim footprints are not parallelograms
+        let growth = whole.growth.filter(|_| scene.antialiasing > 2)?;
+        let is_within = |off: Rgb, mean: Rgb| {
+            let allowed = mean * TOLERANCE.same_mean;
+            off.r <= allowed.r && off.g <= allowed.g && off.b <= allowed.b
+        };
+        let bsdf = whole.bsdf;
+        // An edge between two colours is off by at most an eighth of the growth of the pixel
+        let off = 0.125 * growth;
+        let is_within_by = |part: f32| {
+            let mut colors = contrast.0.into_iter().zip(bsdf.colors.0);
+            is_within(ambient * (off * part), bsdf.ambient)
+                && colors.all(|(contrast, mean)| is_within(contrast * (off * part), mean))
+        };
+        let mean = MeanBsdf { bsdf, is_constant: false, contrast, lobes_differ: false };
+        if is_within_by(1.0) {
+            return Some(mean);
+        }
+        let quarters = self.mean_of_parts(scene, pixel, 2)?;
+        // One colour, but beside an edge, which quarters can miss by a quarter of that
+        if quarters.contrast == Colors::BLACK && !is_within_by(0.25) {
+            return None;
+        }
+        let is_same = |one: Rgb, other: Rgb| is_within((one + other * -1.0).map(f32::abs), other);
+        let is_same = is_same(bsdf.ambient, quarters.bsdf.ambient)
+            && bsdf.colors.0.into_iter().zip(quarters.bsdf.colors.0).all(|(one, other)| is_same(one, other));
+        // The quarters are means of rays: the rays differ by at most twice as much along each axis
+        (is_same && !quarters.lobes_differ).then_some(MeanBsdf {
+            bsdf: quarters.bsdf,
+            contrast: quarters.contrast * 2.0,
+            ..mean
         })
+    }
+
+    /// The mean material over the n x n parts of a pixel that sees only this shape.
+    fn mean_of_parts(self, scene: &Scene, [i, j]: [u32; 2], n: u32) -> Option<MeanBsdf> {
+        let parts = (0..n).flat_map(|row| (0..n).map(move |column| [column, row]));
+        MeanBsdf::of(parts.filter_map(|[column, row]| {
+            let center = |from: u32, part: u32| from as f32 + (part as f32 + 0.5) / n as f32;
+            let (ray, differential) = scene.camera.local_ray(center(i, column), center(j, row), 1.0 / n as f32);
+            // All rays hit the shape but for roundings
+            let t = self.intersect(scene, &ray)?;
+            Some(self.bsdf(scene, &ray, t, &differential))
+        }))
     }
 
     /// The relative growth of a footprint within itself: with the distance, and on a round shape by the slope and

@@ -66,6 +66,11 @@ impl Checkerboard {
         self.colors[0] * (0.5 * (1.0 + mean)) + self.colors[1] * (0.5 * (1.0 - mean))
     }
 
+    /// How far its two colours differ.
+    pub(crate) fn contrast(&self) -> Rgb {
+        (self.colors[0] + self.colors[1] * -1.0).map(f32::abs)
+    }
+
     /// Whether all within a step of the footprint lies in one square: the footprint itself reaches half as far.
     pub(crate) fn is_even(&self, uv: Vec2, footprint: &Footprint) -> bool {
         let scale = self.scale();

@@ -41,6 +41,14 @@ impl Texture {
         }
     }
 
+    /// How far its colours differ, if its value is the area mean over the footprint, whatever its size.
+    pub(crate) fn contrast(&self) -> Option<Rgb> {
+        match self {
+            Texture::Checkerboard(board) => Some(board.contrast()),
+            Texture::Image(_) => None,
+        }
+    }
+
     /// Whether it is proved to be the same all within a step of the footprint.
     pub(crate) fn is_even(&self, si: &SurfaceInteraction) -> bool {
         match self {

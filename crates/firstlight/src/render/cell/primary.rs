@@ -113,7 +113,7 @@ impl CellRenderer<'_> {
         let (scene, n) = (self.scene, self.scene.antialiasing);
         let mut pixel = self.pixel([i, j], n * n, counts);
         let rays = self.pixel_rays.of(scene, [i, j]).to_vec();
-        let mut points = Vec::new();
+        let mut points = Vec::with_capacity(rays.len());
         for (k, ray) in (0..).zip(rays) {
             let at = [k % n, k / n].map(|at| at as u16);
             // Only textures need differentials
