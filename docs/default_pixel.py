@@ -435,7 +435,7 @@ CELL = (736, 960)  # where the pixel's cell of 32 x 32 pixels begins
 SQUARES = ((752, 976, 16), (752, 984, 8), (752, 984, 4), (752, 984, 2))  # those of the grid that hold the pixel
 MOTION = 1.0  # what the grid allows, as a part of the light's size
 CROSSED = 0.3  # beyond it, squares of more than two pixels have a lower tolerance
-PREDICTED = (0.8, 0.28)  # the tolerance in display steps, and that lower one
+PREDICTED = (1.6, 0.56)  # the tolerance in display steps, and that lower one
 FOLLOWED = 3  # the row of the first panel that is worked out, counted from 0
 
 

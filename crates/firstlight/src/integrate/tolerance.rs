@@ -36,7 +36,7 @@ pub(crate) struct Tolerance {
 
     // One point in place of others
     /// In display steps: the interpolation error from the corners of a square at its other nodes, for one light. Runs:
-    /// rms 0.104 and 0.105; time 1.14 and 0.82 on config 11 at 384 pixels, 1.06 and 0.99 on the gallery.
+    /// of 0.4, 0.8 and 1.6: rms 0.104, 0.104 and 0.105; time 1.14, 1 and 0.82 on config 11 at 384 pixels.
     pub foretold: f32,
     /// A factor of that and of [`spread`](Self::spread) where irradiance may have a discontinuous derivative: behind
     /// occluders in trees, at the horizon, and at the edge of a penumbra. A quadratic interpolates worse there than the
@@ -123,7 +123,7 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     part: 0.5,
     fit_cut: 0.1,
     highlight: 8.0,
-    foretold: 0.8,
+    foretold: 1.6,
     bends_at_once: 0.35,
     spread: 5.0,
     motion: 0.3,

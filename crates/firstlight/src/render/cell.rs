@@ -23,7 +23,7 @@ use std::ops::ControlFlow;
 
 use super::Counts;
 use super::direct::{DirectLighting, LightEstimate, LightQuery};
-use super::fragment::{Fragment, Fragments, ShadingRate};
+use super::fragment::{Fragment, Fragments, RayPoint, ShadingRate};
 use super::lighting_grid::{LightingGrid, SurfaceBlock};
 use super::many::Many;
 use super::pooled::{PooledVisibility, salt};
@@ -38,6 +38,7 @@ use crate::film::{AaMode, Heat};
 use crate::image::Buffer;
 use crate::integrate::TOLERANCE;
 use crate::material::{Bsdf, Colors, MOMENTS, Moments};
+use crate::math::Ray;
 use crate::scene::Scene;
 use crate::visibility::Visibility;
 use mesh_shadows::MeshShadows;
@@ -104,6 +105,9 @@ pub(crate) struct CellRenderer<'a> {
     grid: LightingGrid,
     fragments: Fragments,
     pixel_rays: PixelRays,
+    /// Of one pixel: its camera rays, and their hits.
+    rays: Vec<Ray>,
+    ray_points: Vec<RayPoint>,
     hits: PixelHits,
     /// The lights to be estimated at each [`ShadingRate`].
     queues: [Vec<FragmentQuery>; 3],
@@ -132,6 +136,8 @@ impl<'a> CellRenderer<'a> {
             grid: LightingGrid::new(few),
             fragments: Fragments::new(scene, many.is_some()),
             pixel_rays,
+            rays: Vec::new(),
+            ray_points: Vec::new(),
             hits,
             queues: Default::default(),
             shadows: MeshShadows::new(scene, few),

@@ -112,16 +112,17 @@ impl CellRenderer<'_> {
     fn add_pixel(&mut self, [i, j]: [u32; 2], seen: impl Fn(&Self, [u16; 2], &Ray) -> Seen, counts: &mut Counts) {
         let (scene, n) = (self.scene, self.scene.antialiasing);
         let mut pixel = self.pixel([i, j], n * n, counts);
-        let rays = self.pixel_rays.of(scene, [i, j]).to_vec();
-        let mut points = Vec::with_capacity(rays.len());
-        for (k, ray) in (0..).zip(rays) {
+        let (mut rays, mut points) = (std::mem::take(&mut self.rays), std::mem::take(&mut self.ray_points));
+        rays.clear();
+        rays.extend_from_slice(self.pixel_rays.of(scene, [i, j]));
+        for (k, ray) in (0..).zip(&rays) {
             let at = [k % n, k / n].map(|at| at as u16);
             // Only textures need differentials
             let differential = || match scene.textures.is_empty() {
                 true => RayDifferential::default(),
                 false => camera_ray(scene, i * n + k % n, j * n + k / n).1,
             };
-            let Some((shape, hit)) = seen(self, at, &ray) else {
+            let Some((shape, hit)) = seen(self, at, ray) else {
                 pixel.terms.background += 1;
                 continue;
             };
@@ -132,11 +133,11 @@ impl CellRenderer<'_> {
             let point = match shape {
                 Some(shape) => {
                     let plain = self.fragments.plain_bsdf(scene, shape);
-                    let bsdf = plain.unwrap_or_else(|| shape.bsdf(scene, &ray, hit.t, &differential()));
-                    shape.point(scene, &ray, hit.t, &bsdf)
+                    let bsdf = plain.unwrap_or_else(|| shape.bsdf(scene, ray, hit.t, &differential()));
+                    shape.point(scene, ray, hit.t, &bsdf)
                 }
                 None => {
-                    let si = scene.local_surface(&ray, &hit, &differential());
+                    let si = scene.local_surface(ray, &hit, &differential());
                     let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
                     ShadingPoint::of(&si, &bsdf, scene.ambient)
                 }
@@ -146,6 +147,7 @@ impl CellRenderer<'_> {
         let number = self.pixels.len() as u32;
         self.pixels.push(pixel);
         self.fragments.add(scene, number, [i, j], &mut points, self.mode == AaMode::Adaptive);
+        (self.rays, self.ray_points) = (rays, points);
     }
 
     /// Adds the blocks of a square that provably sees one shape: one of each lobe.
