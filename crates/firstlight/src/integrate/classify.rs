@@ -346,7 +346,8 @@ impl<S: Simd> LightPyramid16<S> {
     }
 }
 
-/// The occlusion of a light from the points in `lanes`, of up to sixteen whose coordinates are in `frames`. To be called within `vectorize`.
+/// The occlusion of a light from the points in `lanes`, of up to sixteen whose coordinates are in `frames`. To be
+/// called within `vectorize`.
 #[inline(always)]
 pub(crate) fn classify<S: Simd>(
     simd: S,

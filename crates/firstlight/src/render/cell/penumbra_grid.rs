@@ -290,7 +290,8 @@ impl CellRenderer<'_> {
             self.note_all(square, light, Visibility::Listed);
             return true;
         }
-        let (lights, wide) = (self.scene.lights.len(), (side / SMALLEST) as f32);
+        // Sampled nodes have errors of their own: a half of the tolerance is left for those of the interpolation
+        let (lights, wide) = (self.scene.lights.len(), (2 * side / SMALLEST) as f32);
         let steps = |k: usize, error: &Moments| self.steps_of(positions[k], light, &moments[k], error, counts) * wide;
         if fractions.iter().any(|fraction| fraction.is_nan()) || !of.pass_bilinear_test(&moments, lights, false, steps)
         {
