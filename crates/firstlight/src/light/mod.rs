@@ -159,7 +159,7 @@ impl LightDesc {
     }
 
     /// Where it is moved, if it says so.
-    pub(crate) fn transform(&self) -> Option<&TransformDesc> {
+    pub fn transform(&self) -> Option<&TransformDesc> {
         of_table!(self, light => light.transform.as_deref())
     }
 
