@@ -289,7 +289,7 @@ impl AreaLightIntegrator {
                     Visibility::Full => is(horizons.above_around) && one.motion == 0.0,
                     Visibility::Listed | Visibility::Partial => false,
                 };
-                let max_evaluations = LightTask::max_evaluations(LARGEST_CODE) * point.part_of_points;
+                let max_evaluations = LightTask::max_evaluations(LARGEST_CODE) * point.closed_form_budget;
                 let is_wanted = task.sums && (one.proved || one.motion <= point.most_motion);
                 if is_wanted && matches!(one.visibility, Visibility::Full | Visibility::Listed) {
                     let number = (start + k) as u32;
@@ -376,7 +376,7 @@ impl AreaLightIntegrator {
         for ((state, point), sent) in state.iter_mut().zip(points).zip(&sent) {
             let error = (task.scale * point.bsdf.colors).of(sent);
             let steps = task.steps.of_color(point.base + error * 0.5, error);
-            state.max_evaluations = LightTask::max_evaluations(steps) * point.part_of_points;
+            state.max_evaluations = LightTask::max_evaluations(steps) * point.closed_form_budget;
         }
     }
 
@@ -408,7 +408,8 @@ impl AreaLightIntegrator {
         }
     }
 
-    /// Marks partially visible points beyond their limit as [`Visibility::Partial`]. Returns whether there was any.
+    /// Leaves points whose occluded light takes more evaluations than allowed to be sampled: [`Visibility::Partial`].
+    /// Returns whether there was any.
     fn give_up(&mut self, integrals: &mut [LightIntegral]) -> bool {
         let mut is_any = false;
         for ((state, mask), integrals) in self.state.iter_mut().zip(&self.masks).zip(integrals) {

@@ -37,7 +37,7 @@ pub(crate) struct Tolerance {
     // One point in place of others
     /// In display steps: the interpolation error from the corners of a square at its other nodes, for one light. Runs:
     /// of 0.4, 0.8 and 1.6: rms 0.104, 0.104 and 0.105; time 1.14, 1 and 0.82 on config 11 at 384 pixels.
-    pub foretold: f32,
+    pub bilinear_error: f32,
     /// A factor of that and of [`spread`](Self::spread) where irradiance may have a discontinuous derivative: behind
     /// occluders in trees, at the horizon, and at the edge of a penumbra. A quadratic interpolates worse there than the
     /// corners show. Runs: rms 0.104 and 0.104, time 0.98 and 0.99.
@@ -56,7 +56,7 @@ pub(crate) struct Tolerance {
     pub middle_bend: f32,
     pub quadrant_bend: f32,
     /// In display steps: the effect of colours that vary together with irradiance.
-    pub mingled: f32,
+    pub color_light_covariance: f32,
     /// The length of a difference of unit normals: their deviation from linear variation or from their mean. Beyond it
     /// there is a crease.
     pub even: f32,
@@ -78,16 +78,17 @@ pub(crate) struct Tolerance {
     /// In effective samples: as many unoccluded ones of a pixel count as full visibility; and as many of all rays
     /// together give an estimate.
     pub clear: f32,
-    pub told: f32,
-    /// A part of the allowed error: that of strata without samples.
-    pub untold: f32,
+    pub enough_samples: f32,
+    /// A part of the allowed error: that of moments with fewer effective samples than that, or of which the samples
+    /// find too small a part.
+    pub undersampled: f32,
     /// A part of its contribution: the error of a group of samples that a silhouette crosses. Runs: rms 0.142 and
     /// 0.087, time 0.91 and 1.20.
-    pub mixed: f32,
+    pub silhouette_groups: f32,
     /// A factor of the variation within other groups: their error.
-    pub alike: f32,
+    pub smooth_groups: f32,
     /// Over the root of the number of groups, a part: the error of the variance.
-    pub few_packets: f32,
+    pub few_groups: f32,
     /// A part of the deviation of independent samples: that of all rays together, which are stratified.
     pub stratified: f32,
     /// A factor of the mean contribution: strata beyond it are split.
@@ -100,7 +101,7 @@ pub(crate) struct Tolerance {
     // times are at 128 pixels
     /// In display steps: the root of the sum of squared errors of the nodes of a cut. Runs: rms 0.047 and 0.107, time
     /// 1.40 and 0.63.
-    pub crowd: f32,
+    pub cut_error: f32,
     /// A factor of that: patches at whose own brightness the error is larger get another cut. Runs, with 1 and 2.5: no
     /// change.
     pub lenient: f32,
@@ -123,29 +124,29 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     part: 0.5,
     fit_cut: 0.1,
     highlight: 8.0,
-    foretold: 1.6,
+    bilinear_error: 1.6,
     bends_at_once: 0.35,
     spread: 5.0,
     motion: 0.3,
     middle_turn: 0.06,
     middle_bend: 0.1,
     quadrant_bend: 3.0,
-    mingled: 0.4,
+    color_light_covariance: 0.4,
     even: 0.01,
     same_mean: 0.004,
     half_of_rays: 16.0,
     first_points: 256.0,
     nearer: 4.0,
     clear: 96.0,
-    told: 16.0,
-    untold: 0.2,
-    mixed: 0.041,
-    alike: 2.3,
-    few_packets: 14.0,
+    enough_samples: 16.0,
+    undersampled: 0.2,
+    silhouette_groups: 0.041,
+    smooth_groups: 2.3,
+    few_groups: 14.0,
     stratified: 0.5,
     heavy: 2.0,
     node_pixels: 0.64,
-    crowd: 1.5,
+    cut_error: 1.5,
     lenient: 1.25,
     sure: 0.8,
     integrals: 0.225,

@@ -1,4 +1,5 @@
-//! What light makes of a material, before colours: the moments of its directions, and the colours they are worth.
+//! The moments of a light at a shading point: the integrals of the cosine and of the lobe over the visible part of the
+//! light, without reflectances; and the reflectances of a material, one colour for each moment.
 
 use std::ops::{Add, AddAssign, Mul};
 

@@ -33,14 +33,15 @@ pub(crate) struct ShadingPoint {
     /// Radius of the footprint in metres, and by how many radians normals vary over it; 0 for a point alone.
     pub reach: f32,
     pub turn: f32,
-    /// The share of a pixel that the point represents.
+    /// The share of a pixel by which errors at the point are judged: that of all rays of its fragment, whose errors are
+    /// not independent.
     pub share: f32,
     /// How far silhouettes may move on the light over the footprint, as a part of the light's size: where they move
     /// farther, and visibility is not proved, the integral is not computed.
     pub most_motion: f32,
-    /// The part of the pixel's budget of light samples that the point has: the closed form is given up where it would
-    /// cost more. Infinite: it is never given up.
-    pub part_of_points: f32,
+    /// The part of the pixel's budget of evaluations of closed forms that the point has: beyond it the light is
+    /// sampled. Infinite: it is never sampled for that.
+    pub closed_form_budget: f32,
 }
 
 impl ShadingPoint {
@@ -62,7 +63,7 @@ impl ShadingPoint {
             turn: 0.0,
             share: 1.0,
             most_motion: f32::INFINITY,
-            part_of_points: f32::INFINITY,
+            closed_form_budget: f32::INFINITY,
         }
     }
 
@@ -77,7 +78,7 @@ impl ShadingPoint {
 
     /// Whether the closed form is given up where it costs too much.
     pub fn is_bounded(&self) -> bool {
-        self.part_of_points < f32::INFINITY
+        self.closed_form_budget < f32::INFINITY
     }
 
     /// Where rays to lights start.

@@ -344,7 +344,7 @@ impl<'a> CellRenderer<'a> {
                 let Some(slope) = self.grid.slope(block, light, at) else { return false };
                 error += self.lights.scale(light) * contrast.of(&slope) * 0.125;
             }
-            if self.lights.steps(self.sums.color(index), error) > TOLERANCE.mingled {
+            if self.lights.steps(self.sums.color(index), error) > TOLERANCE.color_light_covariance {
                 return false;
             }
         }
@@ -374,7 +374,7 @@ impl<'a> CellRenderer<'a> {
             let own = rest.split_off(..self.fragments.all[fragment as usize].range(rate).len()).unwrap_or_default();
             let pixel = self.pixel_of(fragment as usize);
             self.sums.work[pixel] += Heat::PLACE * own.len() as f32;
-            if self.represent(rate, &query, own) {
+            if self.is_represented(rate, &query, own) {
                 let of = &self.fragments.all[fragment as usize];
                 let mut sum = LightTerm::BLACK;
                 for (point, estimate) in of.range(rate).zip(own) {
@@ -417,7 +417,7 @@ impl<'a> CellRenderer<'a> {
     }
 
     /// Whether the estimates of a light at the shading points of a rate represent a fragment.
-    fn represent(&self, rate: ShadingRate, query: &FragmentQuery, estimates: &[LightEstimate]) -> bool {
+    fn is_represented(&self, rate: ShadingRate, query: &FragmentQuery, estimates: &[LightEstimate]) -> bool {
         let fragment = &self.fragments.all[query.fragment as usize];
         let light = query.light;
         match (rate, estimates) {
@@ -481,7 +481,7 @@ impl<'a> CellRenderer<'a> {
             let (_, contrast) = self.fragments.part(ShadingRate::Quadrant, point);
             let error = scale * contrast.of(&range) * 0.125;
             contrast == Colors::BLACK
-                || estimates.len() == 4 && self.lights.steps(value, error) * weight <= TOLERANCE.mingled
+                || estimates.len() == 4 && self.lights.steps(value, error) * weight <= TOLERANCE.color_light_covariance
         })
     }
 

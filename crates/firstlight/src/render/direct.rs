@@ -201,7 +201,7 @@ impl<'a> DirectLighting<'a> {
     }
 
     /// Whether a light is integrated and casts shadows: then it is sampled behind occluders in BVHs.
-    pub fn is_behind(&self, index: usize) -> bool {
+    pub fn is_sampled_past_trees(&self, index: usize) -> bool {
         self.is_integrated(index) && self.scene.lights[index].shadows
     }
 

@@ -144,9 +144,9 @@ impl Fragments {
     /// Adds a fragment of the rays from number `first` on.
     fn push(&mut self, scene: &Scene, pixel: u32, at: [u32; 2], shape: Option<VisibleShape>, first: usize, share: f32) {
         let rays = first..self.rays.len();
-        let part_of_points = 1.0 / rays.len() as f32;
+        let closed_form_budget = 1.0 / rays.len() as f32;
         for point in &mut self.rays[rays.clone()] {
-            (point.share, point.part_of_points) = (share, part_of_points);
+            (point.share, point.closed_form_budget) = (share, closed_form_budget);
         }
         let bsdfs = self.rays[rays.clone()].iter().map(|ray| ray.bsdf);
         let mean = MeanBsdf::of(bsdfs).expect("a fragment has a ray");
@@ -155,8 +155,8 @@ impl Fragments {
         let points = self.points.len();
         if let Some(center) = center {
             // It is used only where the light is proved to vary little
-            let part_of_points = f32::INFINITY;
-            self.points.push(ShadingPoint { share, most_motion: -1.0, part_of_points, ..center });
+            let closed_form_budget = f32::INFINITY;
+            self.points.push(ShadingPoint { share, most_motion: -1.0, closed_form_budget, ..center });
             self.parts.push((rays.len() as u32, Colors::BLACK));
         }
         self.all.push(Fragment {
@@ -195,7 +195,7 @@ impl Fragments {
         let reach = part * apart(0, 3).max(apart(1, 2));
         let turn = reach * shape.curvature(scene);
         for point in points {
-            *point = ShadingPoint { reach, turn, most_motion: TOLERANCE.motion, part_of_points: 0.25, ..*point };
+            *point = ShadingPoint { reach, turn, most_motion: TOLERANCE.motion, closed_form_budget: 0.25, ..*point };
             self.parts.push((n * n / 4, Colors::BLACK));
         }
         self.all.push(Fragment {
@@ -229,8 +229,8 @@ impl Fragments {
             self.rays.resize(first + rays.len(), last);
             self.at.resize(first + rays.len(), *self.at.last().expect("each ray has one"));
         }
-        let part_of_points = 1.0 / (self.rays.len() - first) as f32;
-        self.rays[first..].iter_mut().for_each(|point| point.part_of_points = part_of_points);
+        let closed_form_budget = 1.0 / (self.rays.len() - first) as f32;
+        self.rays[first..].iter_mut().for_each(|point| point.closed_form_budget = closed_form_budget);
         let fragment = &mut self.all[fragment];
         (fragment.rays, fragment.count) = (first..self.rays.len(), (self.rays.len() - first) as u32);
     }
@@ -266,8 +266,8 @@ impl Fragments {
                 false => MeanBsdf::of(own.clone().map(|ray| self.rays[ray].bsdf))?,
             };
             let point = self.center(scene, pixel, shape, &mean.bsdf, own)?;
-            let part_of_points = count as f32 / rays.len() as f32;
-            self.points.push(ShadingPoint { share, most_motion: TOLERANCE.motion, part_of_points, ..point });
+            let closed_form_budget = count as f32 / rays.len() as f32;
+            self.points.push(ShadingPoint { share, most_motion: TOLERANCE.motion, closed_form_budget, ..point });
             self.parts.push((count as u32, mean.contrast));
         }
         Some(())

@@ -111,7 +111,8 @@ impl SquareNodes {
     ) -> bool {
         // Where the light sets in its derivative is not continuous
         let bends = may_bend || nodes.contains(&Moments::ZERO);
-        let allowed = TOLERANCE.foretold * if bends { TOLERANCE.bends_at_once } else { 1.0 } / (lights as f32).sqrt();
+        let allowed =
+            TOLERANCE.bilinear_error * if bends { TOLERANCE.bends_at_once } else { 1.0 } / (lights as f32).sqrt();
         [1, 3, 4, 5, 7].into_iter().all(|k| {
             let ([left, right], [up, down]) = (self.columns.line()[k % 3], self.rows.line()[k / 3]);
             let row = |k: usize| nodes[k] * left + nodes[k + 2] * right;

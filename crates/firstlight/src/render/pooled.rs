@@ -44,7 +44,7 @@ struct Pending {
     visibility: Visibility,
 }
 
-/// One light at the rays of one patch.
+/// One light, sampled at all rays of a fragment together.
 pub(crate) struct PooledVisibility {
     light: usize,
     /// What its moments are multiplied with, before the colours of the surface.
@@ -119,18 +119,18 @@ impl PooledVisibility {
         visibility: Visibility,
         counts: &mut Counts,
     ) {
-        let point = ShadingPoint { share: self.share, part_of_points: f32::INFINITY, ..*point };
+        let point = ShadingPoint { share: self.share, closed_form_budget: f32::INFINITY, ..*point };
         if lights.is_integrated(self.light) {
             self.pending.push(Pending { point, visibility });
         } else {
             let moments = lights.estimate_one(self.light, &point, visibility, counts).moments;
-            self.add_known(&point, &moments, Self::fraction(visibility));
+            self.add_known(&point, &moments, Some(Self::fraction(visibility)));
         }
     }
 
-    /// The visible fraction that a closed form comes with.
-    fn fraction(visibility: Visibility) -> Option<f32> {
-        Some(if visibility == Visibility::Full { 1.0 } else { f32::NAN })
+    /// The visible fraction of an integrated light; not a number where only its integral is known.
+    fn fraction(visibility: Visibility) -> f32 {
+        if visibility == Visibility::Full { 1.0 } else { f32::NAN }
     }
 
     /// Adds a ray that samples the light, unless one thing hides all of it.
@@ -166,8 +166,8 @@ impl PooledVisibility {
         let mut points = Vec::new();
         for (one, pending) in all.iter().zip(&pending) {
             // Closed forms are off alike at all rays: by no more than if one stood for all
-            let part_of_points = 1.0 / (one.receivers.len() + pending.len()) as f32;
-            points.extend(pending.iter().map(|ray| ShadingPoint { part_of_points, ..ray.point }));
+            let closed_form_budget = 1.0 / (one.receivers.len() + pending.len()) as f32;
+            points.extend(pending.iter().map(|ray| ShadingPoint { closed_form_budget, ..ray.point }));
         }
         if points.is_empty() {
             return;
@@ -178,7 +178,7 @@ impl PooledVisibility {
         for (one, pending) in all.iter_mut().zip(&pending) {
             for ((point, estimate), visibility) in rays.by_ref().take(pending.len()) {
                 if estimate.moments.is_known() {
-                    one.add_known(point, &estimate.moments, Self::fraction(*visibility));
+                    one.add_known(point, &estimate.moments, Some(Self::fraction(*visibility)));
                 } else {
                     counts.visibility.classes[Visibility::Partial as usize] += 1;
                     one.add_sampled(point, lights, counts);
@@ -247,7 +247,7 @@ impl PooledVisibility {
             let pooled = self.pool(receivers, &strata, sampler.measure());
             let error = pooled.error(&strata, receivers, lights);
             let samples = strata.count();
-            let is_sure = pooled.steps(lights, |k| pooled.undersampled(k)) <= allowed * TOLERANCE.untold;
+            let is_sure = pooled.steps(lights, |k| pooled.undersampled(k)) <= allowed * TOLERANCE.undersampled;
             let is_lit = !pooled.is_hidden && self.is_clear(&pooled);
             let is_dark = pooled.is_dark && samples >= ALL_HIDDEN;
             let is_last = samples >= MOST || !is_split;
@@ -319,8 +319,9 @@ impl PooledVisibility {
     /// Whether samples may miss some of the unoccluded integral.
     fn may_miss(&self, pooled: &PooledEstimate, strata: &Strata, receivers: &[SampledReceiver]) -> bool {
         let spacing = strata.sampler.spacing(strata.count() as f32);
-        let is_unseen =
-            |k: usize| pooled.effective[k] < f64::from(TOLERANCE.told) && receivers.iter().any(|one| one.reflects(k));
+        let is_unseen = |k: usize| {
+            pooled.effective[k] < f64::from(TOLERANCE.enough_samples) && receivers.iter().any(|one| one.reflects(k))
+        };
         (0..MOMENTS).any(is_unseen)
             || receivers.iter().any(|one| !strata.sampler.varies_over(&one.place(self.each), spacing))
     }
@@ -359,7 +360,7 @@ impl PooledEstimate {
 
     /// What too few samples send to be sure of it: it can be off by what one of them sends.
     fn undersampled(&self, k: usize) -> Rgb {
-        if self.effective[k] < f64::from(TOLERANCE.told) {
+        if self.effective[k] < f64::from(TOLERANCE.enough_samples) {
             self.all[k].min(self.all[k] * (1.0 / self.effective[k].max(1.0) as f32))
         } else {
             self.missing[k]
@@ -388,15 +389,17 @@ impl PooledEstimate {
     }
 }
 
-/// How far off an estimate may be, in display steps.
+/// Error estimates of the sum over all receivers, in display steps.
 struct ErrorEstimate {
-    /// By silhouettes, by what varies smoothly, by that and by what no sample met, and by what is overlooked in strata
-    /// that stay as they are.
+    /// By silhouettes: groups of samples of which some are hidden.
     edges: f32,
+    /// By the variation of the light within other groups.
     smooth: f32,
+    /// By that variation and by occluders that no sample met.
     unmet: f32,
+    /// By occluders that no sample met in strata that are not halved.
     overlooked: f32,
-    /// Which blocks of strata are near silhouettes.
+    /// The blocks of strata near silhouettes.
     near: Vec<bool>,
 }
 

@@ -2,12 +2,12 @@
 //!
 //! A [`Shaft`] is the convex hull of some points and a light. [`OccluderList::gather`] finds the occluders in it, once
 //! for all the points; if there are none, the light is fully visible. [`ShadowView::classify`] tests the occluders of
-//! one point against the whole light: the point is below the light's horizon, sees all of it, nothing of it, or is in
+//! one point against the whole light: the light is below the point's horizon, fully visible, hidden, or the point is in
 //! the penumbra. In the penumbra [`ShadowView::mask`] computes which of the light's samples are hidden, a bit for each.
 //!
 //! All results are conservative: each is a proof that the shadow-ray tests of the plain renderer give the same,
-//! rounding included. Where the margin is too small for a proof, that test itself decides. So pictures have the same
-//! bits with and without this module.
+//! rounding included. Where the margin is too small for a proof, that test itself decides. So pictures of sampled
+//! lights have the same bits with and without this module; the default renderer also chooses by it how it samples.
 
 mod cluster_visibility;
 mod mask;

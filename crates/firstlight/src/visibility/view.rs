@@ -22,9 +22,9 @@ pub(crate) enum Visibility {
     None,
     /// Nothing: it is below the horizon of the surface.
     BelowHorizon,
-    /// A part that has no closed form, or may be anything: each sample is tested.
+    /// It may be hidden in part, by occluders without a closed form, or nothing is known: each sample is tested.
     Partial,
-    /// A part: what listed shapes leave of it, in closed form.
+    /// Only listed shapes may hide it: the part that they leave visible has a closed form.
     Listed,
 }
 

@@ -24,7 +24,7 @@ pub(super) enum FragmentLight {
     Done,
     /// The visibility of the light from all rays.
     Seen(Visibility),
-    /// Rays differ: each is lit by itself.
+    /// Visibility differs between the rays: the light is sampled for all of them together.
     PerRay,
     /// The sum over the rays, with the colours of their surfaces.
     Summed(LightTerm),

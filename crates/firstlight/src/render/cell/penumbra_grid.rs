@@ -79,7 +79,7 @@ impl CellRenderer<'_> {
     ) -> ControlFlow<()> {
         let scene = self.scene;
         let [x, y] = self.corner;
-        let lights = (0..scene.lights.len()).filter(|light| self.lights.is_behind(*light));
+        let lights = (0..scene.lights.len()).filter(|light| self.lights.is_sampled_past_trees(*light));
         let squares = lights.map(|light| (Square { x, y, side: CELL }, light)).collect();
         refine(squares, SMALLEST, [scene.width, scene.height], |mut squares: Vec<(Square, usize)>| {
             squares.sort_by_key(|(square, light)| (square.y, square.x, *light));
@@ -168,8 +168,8 @@ impl CellRenderer<'_> {
         SquareNodes::in_pixels(square, std::array::from_fn(|axis| (self.corner[axis] + CELL).min(size[axis])))
     }
 
-    /// Whether nothing in the trees may occlude a light for a square, which is then stored, or whether no light can
-    /// arrive.
+    /// Whether nothing in the trees may occlude a light for a square, or no light can arrive; the former is stored for
+    /// all fragments of the square.
     fn is_clear(&mut self, square: Square, light: usize, counts: &mut Counts) -> bool {
         let scene = self.scene;
         let Some((_, fragment)) = self.whole([square.x, square.y]) else { return true };
@@ -320,7 +320,9 @@ impl CellRenderer<'_> {
                 let slope = beside(1, i - x).apart(moments) + beside(side as usize, j - y).apart(moments);
                 let scale = self.lights.scale(light);
                 let value = scale * mean.bsdf.colors.of(&moments);
-                if self.lights.steps(value, scale * (mean.contrast.of(&slope) * 0.125)) > TOLERANCE.mingled {
+                if self.lights.steps(value, scale * (mean.contrast.of(&slope) * 0.125))
+                    > TOLERANCE.color_light_covariance
+                {
                     continue;
                 }
             }

@@ -50,7 +50,7 @@ impl<'a> Many<'a> {
         let receives = group.iter().any(|at| patch(at).point.receives_shadow);
         self.cluster_visibility.set_receivers(scene, group.iter().map(|at| receiver(patch(at))));
         let steps = lights.display_steps();
-        let rules = CutRules { tree, steps, receivers: &receivers, colors: &colors, budget: TOLERANCE.crowd };
+        let rules = CutRules { tree, steps, receivers: &receivers, colors: &colors, budget: TOLERANCE.cut_error };
         let mut cut = std::mem::take(&mut self.cut);
         let (simd, cluster_visibility, cache) = (lights.level(), &mut self.cluster_visibility, &mut self.cache);
         let mut classify = |node: &LightNode| {
@@ -67,7 +67,7 @@ impl<'a> Many<'a> {
         };
         cut.begin(&rules, tree.roots.iter().filter(shines));
         let guess = guess.unwrap_or_else(|| {
-            cut.refine(&CutRules { budget: TOLERANCE.crowd * COSTS.pilot, ..rules }, None, &mut classify);
+            cut.refine(&CutRules { budget: TOLERANCE.cut_error * COSTS.pilot, ..rules }, None, &mut classify);
             cut.list_nodes();
             let some = [0, group.len() / 2, group.len() - 1].map(|i| patch(&group[i]));
             let all = some.map(|patch| {
@@ -107,7 +107,7 @@ impl<'a> Many<'a> {
                 let lists = [lit.clone(), maybe.clone()];
                 let (stored, light) = self.patch(patch, &cut.single_lights, lists, lights, counts);
                 let error = cut.error(&patch.point.bsdf.colors);
-                if lights.steps(stored.value, error) > TOLERANCE.crowd * TOLERANCE.lenient && guess != Rgb::BLACK {
+                if lights.steps(stored.value, error) > TOLERANCE.cut_error * TOLERANCE.lenient && guess != Rgb::BLACK {
                     // Darker than the guess
                     self.singles.truncate(singles);
                     found = Some(found.map_or(light, |found| found.min(light)));

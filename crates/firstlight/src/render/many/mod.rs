@@ -2,8 +2,8 @@
 //!
 //! Each block of pixels, or each of its quarters where many lights are near, has a [`Cut`]: nodes of the
 //! [`LightTree`], estimated by their centroid or by a representative light, and single lights
-//! that are integrated. Its error is at most `TOLERANCE.crowd` display steps, as the root of a sum of squares. Cells
-//! and blocks lie on a grid of the film, so nothing depends on tiles, crops or threads.
+//! that are integrated. Its error is at most `TOLERANCE.cut_error` display steps, as the root of a sum of squares.
+//! Cells and blocks lie on a grid of the film, so nothing depends on tiles, crops or threads.
 
 mod apart;
 mod block;

@@ -51,7 +51,7 @@ impl Patches {
 
 impl Patch {
     fn new(point: ShadingPoint) -> Patch {
-        let point = ShadingPoint { share: 1.0, most_motion: f32::INFINITY, part_of_points: f32::INFINITY, ..point };
+        let point = ShadingPoint { share: 1.0, most_motion: f32::INFINITY, closed_form_budget: f32::INFINITY, ..point };
         Patch { point, count: 1, is_whole: false, pixel: 0, fragment: 0 }
     }
 

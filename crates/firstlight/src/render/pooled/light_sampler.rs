@@ -64,7 +64,7 @@ pub(crate) struct SampledReceiver {
 
 impl SampledReceiver {
     pub fn new(point: &ShadingPoint, scale: Rgb, series: usize, view: ShadowView) -> Self {
-        let point = ShadingPoint { part_of_points: f32::INFINITY, ..*point };
+        let point = ShadingPoint { closed_form_budget: f32::INFINITY, ..*point };
         SampledReceiver { point, scale, series, view, unoccluded: None, sums: StratumSums::default() }
     }
 

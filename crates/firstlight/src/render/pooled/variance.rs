@@ -48,8 +48,8 @@ struct GroupSums {
 }
 
 impl VarianceEstimate {
-    /// `sent` is what all receivers are sent, thereabouts: of what is as good as nothing, squares are nothing. `found`
-    /// is the part of the unoccluded integral that samples find, if that is known apart.
+    /// `sent` is about the unoccluded integral over all receivers, the unit of the sums, so that their squares do not
+    /// underflow. `found` is the part of the unoccluded integral that samples find, if that has a closed form.
     pub fn new(
         level: Level,
         strata: &Strata,
@@ -70,17 +70,18 @@ impl VarianceEstimate {
             }
         });
         let [sent, lit] = StratumSums::pooled(receivers);
-        let per_group = squared(TOLERANCE.mixed * of_edge((width * receivers.len()) as f64) / of_edge(LANES as f64));
+        let per_group =
+            squared(TOLERANCE.silhouette_groups * of_edge((width * receivers.len()) as f64) / of_edge(LANES as f64));
         let (mut edges, mut smooth) = (OfMoments::default(), OfMoments::default());
         for k in (0..MOMENTS).filter(|k| sent[*k] > LEAST && unit[*k] > 0.0) {
             let per_sent = 1.0 / (sent[k] as f32 * unit[k]);
             let visible = (lit[k] / sent[k]) as f32;
             // Receivers with other silhouettes are off by chance, each by itself; those with the same are off together
-            let alone = squared(TOLERANCE.mixed) * variance(sums.alone, k);
+            let alone = squared(TOLERANCE.silhouette_groups) * variance(sums.alone, k);
             let together = per_group * variance(sums.together, k);
             edges[k] = if receivers.len() == 1 { alone } else { alone.min(together) }.sqrt() * per_sent;
             let [hidden, lit, mixed] = [0, 1, 2].map(|which: usize| sums.smooth[which][k]);
-            let varies = |hidden: f32, lit: f32| TOLERANCE.alike * (hidden + lit).sqrt() * per_sent;
+            let varies = |hidden: f32, lit: f32| TOLERANCE.smooth_groups * (hidden + lit).sqrt() * per_sent;
             smooth[k] = match found {
                 None => varies(mixed, lit),
                 // Where the unoccluded integral is known, only its visible fraction can be wrong. Samples that do not
@@ -159,9 +160,9 @@ impl AddAssign<&GroupSums> for GroupSums {
     }
 }
 
-/// A sum of squares, and what it may be off by: `TOLERANCE.few_packets` over a root of the effective number of them.
+/// A sum of squares, and what it may be off by: `TOLERANCE.few_groups` over a root of the effective number of them.
 fn variance([squares, of_squares]: [OfMoments; 2], moment: usize) -> f32 {
-    squares[moment] + TOLERANCE.few_packets * of_squares[moment].sqrt()
+    squares[moment] + TOLERANCE.few_groups * of_squares[moment].sqrt()
 }
 
 fn squared(v: f32) -> f32 {
