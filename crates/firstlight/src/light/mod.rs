@@ -277,8 +277,8 @@ impl Light {
         Light { kind, scale, intensity, radiance: said[1].radiance(), said, shadows, exact }
     }
 
-    /// Its shape in space, if it has one: what the camera can see of it, and what can stand in the way of others. It is
-    /// sampled or integrated; of a light from one point, or from one direction, one sample is all of it.
+    /// The emitting surface of an area light: the camera sees it, and it occludes other lights. It is sampled or
+    /// integrated. Point, spot and directional lights have none: one sample is their whole contribution.
     #[inline(always)]
     pub fn area(&self) -> Option<&Area> {
         match &self.kind {
