@@ -26,7 +26,7 @@ pub use disk::{DiskLight, DiskLightDesc};
 pub use point::{Point, PointDesc};
 pub use rectangle::{Rectangle, RectangleDesc};
 pub use samples::SampleSet;
-pub(crate) use samples::{FineCell, SERIES, SeriesPart, with_gaps};
+pub(crate) use samples::{FineCell, SERIES, SeriesPart, mix, with_gaps};
 pub use sphere::{SphereLight, SphereLightDesc};
 pub use spot::{Spot, SpotDesc};
 

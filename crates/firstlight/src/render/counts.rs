@@ -127,7 +127,7 @@ impl Counts {
 
     /// The work so far, in the unit of [`Heat`].
     pub fn work(&self) -> f32 {
-        let rays = self.looks + (self.shadow_rays - self.shadow_rays_skipped) + self.visibility.traced + self.points;
+        let rays = self.looks + (self.shadow_rays - self.shadow_rays_skipped) + self.points;
         let places = self.visibility.classes.iter().sum::<u64>() + self.closed_form;
         rays as f32 + Heat::PLACE * places as f32 + self.lights.nodes as f32
     }

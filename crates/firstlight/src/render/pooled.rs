@@ -21,7 +21,7 @@ use crate::color::Rgb;
 use crate::film::resolve::LightTerm;
 use crate::ids::SurfaceId;
 use crate::integrate::TOLERANCE;
-use crate::light::SERIES;
+use crate::light::{SERIES, mix};
 use crate::material::{MOMENTS, Moments, ShadingPoint};
 use crate::visibility::{ShadowView, Visibility};
 
@@ -93,8 +93,8 @@ impl PooledVisibility {
             each: share / rays as f32,
             others,
             sampled_lights,
-            // Any series, but not by a pattern
-            series: (salt.wrapping_mul(0x9e37_79b9) >> 16) as usize % SERIES,
+            // Without a pattern: the errors of neighbouring pixels would make one too
+            series: mix(salt.into()) as usize % SERIES,
             pending: Vec::new(),
             receivers: Vec::new(),
             rays: 0,

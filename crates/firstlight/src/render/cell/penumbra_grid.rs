@@ -248,7 +248,9 @@ impl CellRenderer<'_> {
                 }
             }
             if let Some(packet) = &mut packet {
-                counts.visibility.traced += packet.trace(scene, |_, inner| hidden[inner as usize] += 1);
+                let traced = packet.trace(scene, |_, inner| hidden[inner as usize] += 1);
+                counts.visibility.traced += traced;
+                counts.shadow_rays += traced;
             }
         }
         for inner in 0..LANES {

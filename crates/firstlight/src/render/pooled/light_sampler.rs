@@ -181,8 +181,7 @@ impl<'a> LightSampler<'a> {
         counts: &mut Counts,
     ) {
         let points = wanted.iter().map(|bits| u64::from(bits.count_ones())).sum::<u64>() * receivers.len() as u64;
-        counts.shadow_rays += points;
-        counts.shadow_rays_skipped += points;
+        let traced_before = counts.visibility.traced;
         let mut traced = Vec::new();
         for (number, (receiver, set)) in receivers.iter_mut().zip(sets).enumerate() {
             let (view, point) = (&mut receiver.view, Viewpoint::of(&receiver.point));
@@ -195,22 +194,25 @@ impl<'a> LightSampler<'a> {
                 counts.visibility.traced += view.mask(self.level, self.scene, target, Some(wanted), &point);
             }
         }
-        let Some((_, any)) = traced.first() else { return };
-        let mut packet = Packet::new(self.end(), any);
-        let mut hide = |receiver: u32, k: u32| {
-            receivers[receiver as usize].view.hidden[k as usize / LANES] |= 1 << (k as usize % LANES);
-        };
-        // The rays to one stratum are nearly parallel
-        let is_wanted = |k: &usize| wanted[k / LANES] >> (k % LANES) & 1 == 1;
-        for k in (0..wanted.len() * LANES).filter(is_wanted) {
-            for (number, point) in &traced {
-                let l = sets[*number as usize].points.get(k) - point.p;
-                if point.horizon.dot(l) > 0.0 && packet.add(*number, point, l, k as u32) {
-                    counts.visibility.traced += packet.trace(self.scene, &mut hide);
+        if let Some((_, any)) = traced.first() {
+            let mut packet = Packet::new(self.end(), any);
+            let mut hide = |receiver: u32, k: u32| {
+                receivers[receiver as usize].view.hidden[k as usize / LANES] |= 1 << (k as usize % LANES);
+            };
+            // The rays to one stratum are nearly parallel
+            let is_wanted = |k: &usize| wanted[k / LANES] >> (k % LANES) & 1 == 1;
+            for k in (0..wanted.len() * LANES).filter(is_wanted) {
+                for (number, point) in &traced {
+                    let l = sets[*number as usize].points.get(k) - point.p;
+                    if point.horizon.dot(l) > 0.0 && packet.add(*number, point, l, k as u32) {
+                        counts.visibility.traced += packet.trace(self.scene, &mut hide);
+                    }
                 }
             }
+            counts.visibility.traced += packet.trace(self.scene, hide);
         }
-        counts.visibility.traced += packet.trace(self.scene, hide);
+        counts.shadow_rays += points;
+        counts.shadow_rays_skipped += points - (counts.visibility.traced - traced_before);
     }
 
     /// What points at some places of the parameter square would send to a receiver, each for all of the light.
