@@ -1,5 +1,6 @@
 //! Materials: how a surface turns the light that arrives into the light that leaves.
 
+mod alpha;
 mod blinn_phong;
 mod highlight;
 mod lobe_lanes;
@@ -7,6 +8,7 @@ mod moments;
 mod phong;
 mod shading_point;
 
+pub use alpha::{Alpha, AlphaMode};
 pub use blinn_phong::{BlinnPhongDesc, BlinnPhongLobe};
 pub(crate) use highlight::Highlight;
 pub(crate) use lobe_lanes::LobeLanes;
@@ -63,6 +65,10 @@ pub struct Material {
     pub shininess: Param<f32>,
     /// The highlight's shape.
     pub lobe: LobeKind,
+    /// Its alpha; `None` if it is opaque.
+    pub alpha: Option<Alpha>,
+    /// Whether camera rays pass through from behind.
+    pub single_sided: bool,
 }
 
 /// The largest exponent of a highlight.
@@ -84,6 +90,8 @@ impl Material {
             ambient: ambient.as_ref().map(|a| params.color(cx, "ambient", a)),
             shininess: params.number(cx, "shininess", shininess, [0.0, MAX_SHININESS as f64]),
             lobe,
+            alpha: None,
+            single_sided: false,
         }
     }
 
@@ -95,6 +103,8 @@ impl Material {
             ambient: None,
             shininess: Param::constant(1.0),
             lobe: LobeKind::Phong,
+            alpha: None,
+            single_sided: false,
         }
     }
 
@@ -173,6 +183,12 @@ pub struct Bsdf {
 }
 
 impl Bsdf {
+    /// The same, of which only a part is seen: what leaves is so many times as much.
+    #[inline(always)]
+    pub(crate) fn weighted(self, weight: f32) -> Bsdf {
+        Bsdf { colors: self.colors * weight, ambient: self.ambient * weight, lobe: self.lobe }
+    }
+
     /// What leaves under such ambient light, beside the light of lights.
     #[inline(always)]
     pub(crate) fn base(&self, ambient: Rgb) -> Rgb {

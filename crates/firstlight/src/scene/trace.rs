@@ -166,7 +166,7 @@ impl Scene {
     ) -> SurfaceInteraction {
         let surface = &self.geometry.surfaces[hit.surface.index()];
         let point = self.geometry.point(ray, hit, differential, terminator);
-        let ShapePoint { p, error, normal, shading, lifted, uv, footprint, color } = point;
+        let ShapePoint { p, error, normal, shading, lifted, uv, footprint, color, alpha } = point;
         let error = error.widened(self.geometry.rounding);
         let wo = -ray.d;
         let (ng, ns) = if normal.dot(wo) < 0.0 { (-normal, -shading) } else { (normal, shading) };
@@ -190,6 +190,7 @@ impl Scene {
             uv,
             footprint,
             color,
+            alpha,
             surface,
             material,
             receives_shadow,

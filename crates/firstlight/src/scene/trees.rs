@@ -314,8 +314,10 @@ impl Geometry {
 
     /// Whether a camera ray ends at a triangle, or passes through.
     pub(super) fn seen(&self, mesh: &Mesh, first: u32, triangle: u32, d: Vec3) -> bool {
-        let surface = &self.surfaces[(first + mesh.part(triangle).surface) as usize];
-        surface.visible && !(surface.single_sided && mesh.is_behind(triangle, d))
+        let part = mesh.part(triangle);
+        let surface = &self.surfaces[(first + part.surface) as usize];
+        let of_face = || surface.material.is_none() && self.rules.is_single_sided(part.material(triangle));
+        surface.visible && !((surface.single_sided || of_face()) && mesh.is_behind(triangle, d))
     }
 
     /// The first triangle on a ray, in the mesh's space. Not inlined: one copy for each instruction set is enough.
@@ -473,7 +475,7 @@ impl Geometry {
     pub fn primitive(&self, hit: &Hit) -> Option<u32> {
         match hit.at {
             At::Placed(_, PlacedSpot::Point(point)) => Some(point),
-            _ => self.triangle(hit).map(|(part, triangle)| triangle - part.first_triangle),
+            _ => self.triangle(hit).map(|(part, triangle)| part.number(triangle)),
         }
     }
 }

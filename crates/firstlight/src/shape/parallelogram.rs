@@ -161,6 +161,7 @@ impl Parallelogram {
             uv: uv.as_vec2(),
             footprint: Footprint { dx, dy, edges: [UvEdge::Bounded; 2] },
             color: Rgb::WHITE,
+            alpha: 1.0,
         }
     }
 

@@ -53,7 +53,7 @@ pub(crate) struct PointSet {
     /// Centre and radius of each.
     spheres: Vec<[f32; 4]>,
     /// Empty, or one for each sphere.
-    colors: Vec<[f32; 3]>,
+    colors: Vec<[f32; 4]>,
     /// What was taken off every centre.
     origin: DVec3,
     tree: Bvh,
@@ -280,7 +280,10 @@ impl PointSet {
         // Of equal spheres the first is the one that is seen
         let tree = Bvh::build_distinct(&boxes, |id| spheres[id as usize].map(|x| (x + 0.0).to_bits()));
         let colors =
-            data.colors.iter().map(|[r, g, b, _]| [*r, *g, *b].map(|c| if c >= 0.0 { c.min(1e6) } else { 0.0 }));
+            data.colors.iter().map(|[r, g, b, a]| {
+                let [r, g, b] = [*r, *g, *b].map(|c| if c >= 0.0 { c.min(1e6) } else { 0.0 });
+                [r, g, b, if *a >= 0.0 { a.min(1.0) } else { 0.0 }]
+            });
         PointSet { spheres, colors: colors.collect(), origin: data.origin.into(), tree }
     }
 
@@ -317,6 +320,11 @@ impl PointSet {
         // Those that are left out are nowhere
         let there = self.spheres.iter().filter(|sphere| sphere.iter().all(|x| x.is_finite()) && sphere[3] > 0.0);
         there.map(|sphere| reach(sphere.map(f64::from))).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// The colour and the alpha of a sphere.
+    fn color(&self, index: u32) -> [f32; 4] {
+        self.colors.get(index as usize).copied().unwrap_or([1.0; 4])
     }
 
     fn ball(&self, index: u32) -> PointBall {
@@ -422,7 +430,8 @@ impl PointSet {
         });
         let n = outwards.as_vec3();
         let (uv, dx, dy) = equirectangular(n, dpx, dpy);
-        let color = self.colors.get(index as usize).map_or(Rgb::WHITE, |[r, g, b]| Rgb::new(*r, *g, *b));
+        let [r, g, b, alpha] = self.color(index);
+        let color = Rgb::new(r, g, b);
         ShapePoint {
             p,
             error,
@@ -432,6 +441,7 @@ impl PointSet {
             uv,
             footprint: Footprint { dx, dy, edges: [UvEdge::Periodic, UvEdge::Folded] },
             color,
+            alpha,
         }
     }
 

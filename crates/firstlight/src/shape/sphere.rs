@@ -125,7 +125,7 @@ impl Sphere {
             SphereUv::Angles => [UvEdge::Folded, UvEdge::Folded],
         };
         let footprint = Footprint { dx, dy, edges };
-        ShapePoint { p, error, normal: n, shading: n, lifted: None, uv, footprint, color: Rgb::WHITE }
+        ShapePoint { p, error, normal: n, shading: n, lifted: None, uv, footprint, color: Rgb::WHITE, alpha: 1.0 }
     }
 
     /// How the point that `ray` meets at `t` moves with u and with v.

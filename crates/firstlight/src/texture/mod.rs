@@ -10,6 +10,7 @@ use crate::color::Rgb;
 use crate::context::CompileContext;
 use crate::describe::{ColorParam, NumberParam, family};
 use crate::ids::TextureId;
+use crate::math::Vec2;
 use crate::shape::SurfaceInteraction;
 
 family! {
@@ -38,6 +39,22 @@ impl Texture {
         match self {
             Texture::Checkerboard(board) => board.color(si.uv, &si.footprint),
             Texture::Image(image) => image.color(si.uv),
+        }
+    }
+
+    /// The share of the footprint whose texels, by their red channel, are `counted`.
+    pub(crate) fn share(&self, si: &SurfaceInteraction, counted: impl Fn(f32) -> bool) -> f32 {
+        match self {
+            Texture::Checkerboard(board) => board.share(si.uv, &si.footprint, |color| counted(color.r)),
+            Texture::Image(image) => f32::from(counted(image.color(si.uv).r)),
+        }
+    }
+
+    /// The red channel at a texture coordinate, at the finest level.
+    pub(crate) fn finest(&self, uv: Vec2) -> f32 {
+        match self {
+            Texture::Checkerboard(board) => board.color_at(uv).r,
+            Texture::Image(image) => image.color(uv).r,
         }
     }
 

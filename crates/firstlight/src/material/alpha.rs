@@ -1,0 +1,67 @@
+//! Alpha: how much of the light behind a surface it stops.
+//!
+//! Light goes straight through the rest. A *mask* is a surface with holes: each texel is there or not. A *blend* is a
+//! veil. Surfaces that are not opaque are met by rays only: see `scene/layers.rs`.
+
+use crate::describe::words;
+use crate::math::Vec2;
+use crate::shape::SurfaceInteraction;
+use crate::texture::{Param, Texture};
+
+words! {
+    /// What is made of the alpha of a material.
+    pub enum AlphaMode {
+        /// Nothing: the surface stops all light.
+        Opaque = "opaque",
+        /// The surface is there where its alpha is `cutoff` or more, and has a hole where it is less.
+        Mask = "mask",
+        /// The surface stops as much of the light behind it as its alpha says.
+        Blend = "blend",
+    }
+}
+
+/// The alpha of a material that is not opaque.
+#[derive(Clone, Copy, Debug)]
+pub struct Alpha {
+    /// 0 lets all light through, 1 none.
+    pub value: Param<f32>,
+    /// Of a mask: the least alpha at which the surface is there.
+    pub cutoff: Option<f32>,
+}
+
+impl Alpha {
+    /// The part of a camera ray that the surface stops, 0 to 1: of a mask the share of the footprint that is there.
+    pub(crate) fn at_surface(&self, si: &SurfaceInteraction, textures: &[Texture]) -> f32 {
+        match self.cutoff {
+            None => bounded(self.value.number(si, textures) * si.alpha),
+            Some(cutoff) => match self.value.texture {
+                None => is_there(self.value.factor * si.alpha, cutoff),
+                Some(id) => {
+                    let factor = self.value.factor * si.alpha;
+                    bounded(textures[id.index()].share(si, |texel| texel * factor >= cutoff))
+                }
+            },
+        }
+    }
+
+    /// The part of a shadow ray that the surface stops where it has such a texture coordinate and vertex alpha: 0 or 1
+    /// of a mask. Textures are read at their finest level.
+    pub(crate) fn at_point(&self, uv: Vec2, vertex: f32, textures: &[Texture]) -> f32 {
+        let texel = self.value.texture.map_or(1.0, |id| textures[id.index()].finest(uv));
+        let alpha = texel * (self.value.factor * vertex);
+        match self.cutoff {
+            None => bounded(alpha),
+            Some(cutoff) => is_there(alpha, cutoff),
+        }
+    }
+}
+
+/// Whether a mask is there, as a number.
+fn is_there(alpha: f32, cutoff: f32) -> f32 {
+    if alpha >= cutoff { 1.0 } else { 0.0 }
+}
+
+/// From 0 to 1, also what is no number.
+fn bounded(alpha: f32) -> f32 {
+    if alpha > 0.0 { alpha.min(1.0) } else { 0.0 }
+}
