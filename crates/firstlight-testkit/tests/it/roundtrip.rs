@@ -346,10 +346,12 @@ fn light() -> impl Strategy<Value = LightDesc> {
 }
 
 fn material() -> impl Strategy<Value = MaterialDesc> {
-    (any::<bool>(), color_param(), color_param(), maybe(color_param()), number_param()).prop_map(
-        |(blinn, diffuse, specular, ambient, shininess)| match blinn {
-            true => MaterialDesc::BlinnPhong(BlinnPhongDesc { diffuse, specular, ambient, shininess }),
-            false => MaterialDesc::Phong(PhongDesc { diffuse, specular, ambient, shininess }),
+    let common = (color_param(), number())
+        .prop_map(|(emissive, emissive_strength)| MaterialCommonDesc { emissive, emissive_strength });
+    (any::<bool>(), color_param(), color_param(), maybe(color_param()), number_param(), common).prop_map(
+        |(blinn, diffuse, specular, ambient, shininess, common)| match blinn {
+            true => MaterialDesc::BlinnPhong(BlinnPhongDesc { diffuse, specular, ambient, shininess, common }),
+            false => MaterialDesc::Phong(PhongDesc { diffuse, specular, ambient, shininess, common }),
         },
     )
 }

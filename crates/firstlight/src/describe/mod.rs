@@ -59,23 +59,40 @@ macro_rules! table {
         $(#[doc = $doc:literal])*
         pub struct $name:ident {
             $( $(#[doc = $fdoc:literal])* pub $field:ident : $ty:ty $(= $default:expr)?, )*
+            // Fields of another table that stand in this one
+            $( ..$flat:ident : $flat_ty:ident, )?
         }
     ) => {
         $(#[doc = $doc])*
         #[derive(Clone, Debug, PartialEq)]
         pub struct $name {
             $( $(#[doc = $fdoc])* pub $field: $ty, )*
+            $(
+                #[doc = concat!("The fields of [`", stringify!($flat_ty), "`], in this table.")]
+                pub $flat: $flat_ty,
+            )?
         }
 
-        $crate::describe::table!(@new $name [] [] $( $field : $ty $(= $default)?, )*);
+        $crate::describe::table!(
+            @new $name [] [$( $flat: <$flat_ty>::default(), )?] $( $field : $ty $(= $default)?, )*
+        );
 
         impl $crate::describe::Table for $name {
             const NAME: &'static str = stringify!($name);
             const DOC: &'static [&'static str] = &[$($doc),*];
-            const FIELDS: &'static [&'static str] = &[$(stringify!($field)),*];
+
+            fn fields() -> Vec<&'static str> {
+                #[allow(unused_mut, reason = "few tables hold the fields of another")]
+                let mut fields = vec![$(stringify!($field)),*];
+                $( fields.extend(<$flat_ty as $crate::describe::Table>::fields()); )?
+                fields
+            }
 
             fn read(fields: &mut $crate::describe::Fields<'_, '_, '_>) -> Self {
-                Self { $( $field: $crate::describe::table!(@read fields, $field $(, $default)?), )* }
+                Self {
+                    $( $field: $crate::describe::table!(@read fields, $field $(, $default)?), )*
+                    $( $flat: <$flat_ty as $crate::describe::Table>::read(fields), )?
+                }
             }
 
             fn write(&self) -> Vec<(&'static str, $crate::describe::TextValue)> {
@@ -85,17 +102,21 @@ macro_rules! table {
                         written.push((stringify!($field), $crate::describe::Value::write(&self.$field)));
                     }
                 )*
+                $( written.extend($crate::describe::Table::write(&self.$flat)); )?
                 written
             }
 
             fn info() -> Vec<$crate::describe::FieldInfo> {
-                vec![$(
+                #[allow(unused_mut, reason = "few tables hold the fields of another")]
+                let mut info = vec![$(
                     $crate::describe::FieldInfo::of::<$ty>(
                         stringify!($field),
                         &[$($fdoc),*],
                         $crate::describe::table!(@default $ty $(, $default)?),
                     ),
-                )*]
+                )*];
+                $( info.extend(<$flat_ty as $crate::describe::Table>::info()); )?
+                info
             }
         }
 

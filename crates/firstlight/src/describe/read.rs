@@ -45,7 +45,7 @@ pub(crate) trait Table: Sized {
     /// The lines of its doc comment.
     const DOC: &'static [&'static str];
     /// The names of its fields.
-    const FIELDS: &'static [&'static str];
+    fn fields() -> Vec<&'static str>;
     /// From the fields of the text.
     fn read(fields: &mut Fields<'_, '_, '_>) -> Self;
     /// The fields that differ from their defaults.
@@ -200,7 +200,7 @@ impl<'a> Reader<'a> {
                 reader: self,
             });
         };
-        let meant = self.unknown_keys(entries, T::FIELDS, what);
+        let meant = self.unknown_keys(entries, &T::fields(), what);
         T::read(&mut Fields { entries, span: node.span, silent: false, meant, reader: self })
     }
 
@@ -216,12 +216,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Records every key that is not in `known`; answers with the known ones that were probably meant.
-    pub(crate) fn unknown_keys(
-        &mut self,
-        entries: &[Entry],
-        known: &'static [&'static str],
-        what: &str,
-    ) -> Vec<&'static str> {
+    pub(crate) fn unknown_keys(&mut self, entries: &[Entry], known: &[&'static str], what: &str) -> Vec<&'static str> {
         let mut meant = Vec::new();
         for entry in entries {
             if !known.contains(&&*entry.key) {

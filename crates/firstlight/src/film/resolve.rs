@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::color::Rgb;
 use crate::image::{Buffer, LightPart, Plane};
-use crate::material::{Colors, MOMENTS};
+use crate::material::{Bsdf, Colors, MOMENTS};
 use crate::scene::Scene;
 
 /// A term of a pixel's colour: a mean over its rays.
@@ -88,6 +88,12 @@ impl ScaledTerm {
 }
 
 impl PixelTerms {
+    /// Adds what a surface emits, and its answer to ambient light, that `rays` rays see.
+    pub fn see(&mut self, scene: &Scene, bsdf: &Bsdf, rays: u32) {
+        self.emission.add(bsdf.emission, rays);
+        self.ambient += bsdf.ambient_light(scene.ambient) * rays as f32;
+    }
+
     /// Adds the terms of single lights, which are no terms of the colour, to the sums of pixel `at` for buffers.
     pub fn keep_apart(scene: &Scene, lights: &[ScaledTerm], at: usize, sums: &mut TermSums) {
         let rays = (scene.antialiasing * scene.antialiasing) as f32;

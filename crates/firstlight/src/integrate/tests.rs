@@ -43,7 +43,7 @@ impl Random {
 
 /// A grey material with a lobe.
 fn gray(lobe: Lobe) -> Bsdf {
-    Bsdf { colors: Colors::default().map(|_| Rgb::gray(0.5)), ambient: Rgb::BLACK, lobe }
+    Bsdf { colors: Colors::default().map(|_| Rgb::gray(0.5)), ambient: Rgb::BLACK, emission: Rgb::BLACK, lobe }
 }
 
 /// A light and a point near the origin, and things between them.

@@ -2,7 +2,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{LobeKind, Material};
+use super::{Classic, LobeKind, Material, MaterialCommonDesc, Reflection};
 use crate::context::CompileContext;
 use crate::describe::{ColorParam, NumberParam, table};
 use crate::math::{Exponent, ExponentLanes};
@@ -29,12 +29,15 @@ table! {
         pub ambient: Option<ColorParam> = None,
         /// The highlight's exponent, 0 to 1000000: the larger, the smaller the highlight.
         pub shininess: NumberParam = NumberParam::constant(16.0),
+        ..common: MaterialCommonDesc,
     }
 }
 
 impl PhongDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext, params: &mut impl Params) -> Material {
-        Material::classic(cx, params, [&self.diffuse, &self.specular], &self.ambient, &self.shininess, LobeKind::Phong)
+        let colors = [&self.diffuse, &self.specular];
+        let classic = Classic::new(cx, params, colors, &self.ambient, &self.shininess, LobeKind::Phong);
+        Material { reflection: Reflection::Classic(classic), common: self.common.compile(cx, params) }
     }
 }
 

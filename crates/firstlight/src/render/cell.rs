@@ -319,7 +319,10 @@ impl<'a> CellRenderer<'a> {
     fn sum_row(&mut self, block: &SurfaceBlock, at: [u32; 2], pixels: usize, bsdf: &Bsdf) {
         let first = self.index(at);
         self.sums.begin(first..first + pixels, Rgb::BLACK, 1.0);
-        let ambient = iter::repeat_n(bsdf.base(self.scene.ambient), pixels);
+        if bsdf.emission != Rgb::BLACK {
+            self.sums.add(first, Term::Emission, Rgb::WHITE, iter::repeat_n(bsdf.emission, pixels));
+        }
+        let ambient = iter::repeat_n(bsdf.ambient_light(self.scene.ambient), pixels);
         self.sums.add(first, Term::Ambient, Rgb::WHITE, ambient);
         for light in 0..self.few {
             let scale = self.lights.scale(light);
@@ -549,7 +552,7 @@ impl<'a> CellRenderer<'a> {
     fn add_ambient(&mut self) {
         for Fragment { pixel, mean, count, .. } in &self.fragments.all {
             let pixel = &mut self.pixels[*pixel as usize];
-            pixel.terms.ambient += mean.bsdf.base(self.scene.ambient) * *count as f32;
+            pixel.terms.see(self.scene, &mean.bsdf, *count);
         }
     }
 

@@ -87,7 +87,7 @@ impl PixelSum {
                 // Evaluate the textures of the material
                 let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
                 let point = ShadingPoint::of(&si, &bsdf, scene.ambient);
-                self.terms.ambient += point.base;
+                self.terms.see(scene, &bsdf, 1);
                 return Some(point);
             }
         }

@@ -60,6 +60,7 @@ impl MeanBsdf {
         for bsdf in bsdfs {
             sum.colors += bsdf.colors;
             sum.ambient += bsdf.ambient;
+            sum.emission += bsdf.emission;
             count += 1.0;
             (least, most) = (least.min(bsdf.colors), most.max(bsdf.colors));
             mean.is_constant &= bsdf == first;
@@ -71,7 +72,12 @@ impl MeanBsdf {
         }
         if !mean.is_constant {
             let part = 1.0 / count;
-            mean.bsdf = Bsdf { colors: sum.colors * part, ambient: sum.ambient * part, lobe: sum.lobe };
+            mean.bsdf = Bsdf {
+                colors: sum.colors * part,
+                ambient: sum.ambient * part,
+                emission: sum.emission * part,
+                lobe: sum.lobe,
+            };
             mean.contrast = most + least * -1.0;
         }
         Some(mean)

@@ -121,8 +121,8 @@ impl MaterialRules {
             false => Vec::new(),
         };
         MaterialRules {
-            layered: each(|material| material.alpha.is_some()),
-            single_sided: each(|material| material.single_sided),
+            layered: each(|material| material.common.alpha.is_some()),
+            single_sided: each(|material| material.common.single_sided),
         }
     }
 
@@ -417,11 +417,8 @@ impl Geometry {
         };
         let upper = Bvh::build_distinct(&boxes, key);
         let is_layered = !layers.is_empty() || !unbounded_layers.is_empty();
-        let layers = is_layered.then(|| Layers {
-            items: layers,
-            upper: Bvh::build(&layer_boxes),
-            unbounded: unbounded_layers,
-        });
+        let layers =
+            is_layered.then(|| Layers { items: layers, upper: Bvh::build(&layer_boxes), unbounded: unbounded_layers });
         let mut geometry = Geometry {
             surfaces,
             spaces,

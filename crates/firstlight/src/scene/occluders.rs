@@ -69,7 +69,9 @@ impl ListedOccluders {
         if geometry.listed {
             let opacity = |surface: SurfaceId| geometry.surfaces[surface.index()].opacity();
             let stops = |layered: bool, surface: SurfaceId| !layered && opacity(surface) != Opacity::Clear;
-            for Owned { shape, surface, .. } in geometry.spheres.iter().filter(|owned| stops(owned.layered, owned.surface)) {
+            for Owned { shape, surface, .. } in
+                geometry.spheres.iter().filter(|owned| stops(owned.layered, owned.surface))
+            {
                 listed.spheres.push(Listed { shape: *shape, opacity: opacity(*surface) });
             }
             let flats = geometry.parallelograms.iter().filter(|owned| stops(owned.layered, owned.surface));

@@ -338,7 +338,7 @@ impl Compiler<'_, '_> {
     /// Compiles the shapes of a group, or of the scene, whose paths begin with `prefix`.
     fn group(&mut self, cx: &mut CompileContext, prefix: &str, shapes: &[ShapeDesc]) -> GroupSpace {
         let mut leaves: Vec<PlacedShape> = Vec::with_capacity(shapes.len());
-        let mut meshes = [MeshBuilder::default(), MeshBuilder { keeps_copies: true, ..MeshBuilder::default() }];
+        let mut meshes = [MeshBuilder::default(), MeshBuilder::with_copies()];
         // Scene order: kind by kind, in each the order of the text
         for (kind, word) in ShapeDesc::KINDS.iter().enumerate() {
             let of_kind = shapes.iter().filter(|shape| shape.kind_index() == kind);
@@ -593,8 +593,10 @@ impl SceneWalk<'_> {
         for (i, leaf) in group.leaves.iter().enumerate() {
             let world = leaf.transform.map_or(world_from_group, |transform| world_from_group * transform);
             let surface = SurfaceId(first + i as u32);
-            let own = if matches!(leaf.form, Form::Instance(_)) { None } else { self.parts.surfaces.get(surface.index()) };
-            let layered = own.and_then(|own| own.material).is_some_and(|material| self.parts.rules.is_layered(material));
+            let own =
+                if matches!(leaf.form, Form::Instance(_)) { None } else { self.parts.surfaces.get(surface.index()) };
+            let layered =
+                own.and_then(|own| own.material).is_some_and(|material| self.parts.rules.is_layered(material));
             let single_sided = own.is_some_and(|own| own.single_sided);
             let seen = over.visible && leaf.surface.visible && !layered;
             if !matches!(leaf.form, Form::Instance(_)) {
@@ -681,9 +683,10 @@ fn opacities(surfaces: &[Surface], rules: &MaterialRules, first: u32, mesh: &Mes
         (false, false) => Opacity::Clear,
     };
     let passes = |material: &MaterialId| rules.is_single_sided(*material);
-    let faces_pass = mesh.parts.iter().any(|part| {
-        surfaces[(first + part.surface) as usize].material.is_none() && part.materials.iter().any(passes)
-    });
+    let faces_pass = mesh
+        .parts
+        .iter()
+        .any(|part| surfaces[(first + part.surface) as usize].material.is_none() && part.materials.iter().any(passes));
     (
         of(own().all(|s| s.visible && !s.single_sided) && !faces_pass, own().any(|s| s.visible)),
         of(own().all(|s| s.opacity() == Opacity::Opaque), own().any(|s| s.opacity() != Opacity::Clear)),

@@ -292,7 +292,7 @@ mod tests {
         let tables = [ShapeDesc::tables(), LightDesc::tables(), MaterialDesc::tables(), TextureDesc::tables()].concat();
         let mut known = vec!["render", "material", "light"];
         known.extend([ShapeDesc::KINDS, LightDesc::KINDS, MaterialDesc::KINDS, TextureDesc::KINDS].concat());
-        known.extend([CameraDesc::FIELDS, RenderDesc::FIELDS, TransformDesc::FIELDS].concat());
+        known.extend([CameraDesc::fields(), RenderDesc::fields(), TransformDesc::fields()].concat());
         known.extend(tables.iter().flat_map(|table| table.fields.iter().map(|field| field.name)));
         for (words, target, _) in SYNONYMS {
             assert!(known.contains(target), "{target} is no word of scene text");

@@ -279,11 +279,10 @@ impl PointSet {
         let boxes: Vec<Aabb> = spheres.iter().map(bounds).collect();
         // Of equal spheres the first is the one that is seen
         let tree = Bvh::build_distinct(&boxes, |id| spheres[id as usize].map(|x| (x + 0.0).to_bits()));
-        let colors =
-            data.colors.iter().map(|[r, g, b, a]| {
-                let [r, g, b] = [*r, *g, *b].map(|c| if c >= 0.0 { c.min(1e6) } else { 0.0 });
-                [r, g, b, if *a >= 0.0 { a.min(1.0) } else { 0.0 }]
-            });
+        let colors = data.colors.iter().map(|[r, g, b, a]| {
+            let [r, g, b] = [*r, *g, *b].map(|c| if c >= 0.0 { c.min(1e6) } else { 0.0 });
+            [r, g, b, if *a >= 0.0 { a.min(1.0) } else { 0.0 }]
+        });
         PointSet { spheres, colors: colors.collect(), origin: data.origin.into(), tree }
     }
 

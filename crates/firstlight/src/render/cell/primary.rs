@@ -192,6 +192,7 @@ impl CellRenderer<'_> {
             all.lobe = all.lobe.with(bsdf.lobe).unwrap_or(all.lobe);
             all.colors = all.colors.max(bsdf.colors);
             all.ambient = all.ambient.min(bsdf.ambient);
+            all.emission = all.emission.min(bsdf.emission);
             let number = means.unwrap_or_default() + square.number(at);
             self.means[number] = Some(mean);
             let index = self.index(at);

@@ -374,6 +374,11 @@ fn join<T: Clone>(list: &mut Vec<T>, length: usize, more: Vec<T>, added: usize, 
 }
 
 impl MeshBuilder {
+    /// Of a mesh in which a triangle that is there twice is met twice.
+    pub fn with_copies() -> MeshBuilder {
+        MeshBuilder { keeps_copies: true, ..MeshBuilder::default() }
+    }
+
     /// Adds a mesh, moved by `transform`; `surface` is its number in the group, `materials` what its faces choose from.
     /// Rays are let through, and light is stopped, by all meshes of a `class` alike.
     pub fn add(

@@ -143,9 +143,7 @@ impl Mesh {
             let own = self.face_normal(triangle).normalize_or_zero();
             n == DVec3::ZERO || (n * n.dot(own).signum() - own).abs().max_element() <= SAME_NORMAL
         };
-        is_one(&self.normals, [a, b, c])
-            && is_one(&self.colors, [a, b, c])
-            && (self.normals.is_empty() || is_own())
+        is_one(&self.normals, [a, b, c]) && is_one(&self.colors, [a, b, c]) && (self.normals.is_empty() || is_own())
     }
 
     /// The part that a triangle belongs to.

@@ -1,0 +1,96 @@
+//! Materials of a diffuse part and a highlight that is a power of a cosine.
+
+use super::{BlinnPhongLobe, Colors, Lobe, LobeKind, PerMoment, PhongLobe};
+use crate::color::Rgb;
+use crate::context::CompileContext;
+use crate::describe::{ColorParam, NumberParam};
+use crate::ids::TextureId;
+use crate::texture::{Param, Params};
+
+/// A diffuse part and a highlight, their parameters still to be looked up.
+#[derive(Clone, Copy, Debug)]
+pub struct Classic {
+    /// Reflected in all directions.
+    pub diffuse: Param<Rgb>,
+    /// The strength of the highlight.
+    pub specular: Param<Rgb>,
+    /// The answer to the scene's ambient light; the diffuse colour where it is `None`.
+    pub ambient: Option<Param<Rgb>>,
+    /// The highlight's exponent.
+    pub shininess: Param<f32>,
+    /// The highlight's shape.
+    pub lobe: LobeKind,
+}
+
+/// The largest exponent of a highlight.
+const MAX_SHININESS: f32 = 1e6;
+
+impl Classic {
+    pub(super) fn new(
+        cx: &mut CompileContext,
+        params: &mut impl Params,
+        [diffuse, specular]: [&ColorParam; 2],
+        ambient: &Option<ColorParam>,
+        shininess: &NumberParam,
+        lobe: LobeKind,
+    ) -> Classic {
+        Classic {
+            diffuse: params.color(cx, "diffuse", diffuse),
+            specular: params.color(cx, "specular", specular),
+            ambient: ambient.as_ref().map(|a| params.color(cx, "ambient", a)),
+            shininess: params.number(cx, "shininess", shininess, [0.0, MAX_SHININESS as f64]),
+            lobe,
+        }
+    }
+
+    /// That of shapes without a material.
+    pub(super) fn matte() -> Classic {
+        Classic {
+            diffuse: Param::constant(Rgb::gray(0.8)),
+            specular: Param::constant(Rgb::BLACK),
+            ambient: None,
+            shininess: Param::constant(1.0),
+            lobe: LobeKind::Phong,
+        }
+    }
+
+    /// The colours of the moments, the answer to ambient light, and the highlight.
+    #[inline(always)]
+    pub(super) fn evaluate(
+        &self,
+        color: impl Fn(&Param<Rgb>) -> Rgb,
+        number: impl Fn(&Param<f32>) -> f32,
+    ) -> (Colors, Rgb, Lobe) {
+        let diffuse = color(&self.diffuse);
+        // The same texture in both is looked up once: config 11 has it so everywhere
+        let specular = match (self.specular.texture, self.diffuse.texture) {
+            (Some(s), Some(d)) if s == d && self.specular.factor == self.diffuse.factor => diffuse,
+            _ => color(&self.specular),
+        };
+        let lobe = if specular.is_black() {
+            Lobe::None
+        } else {
+            let shininess = number(&self.shininess).clamp(0.0, MAX_SHININESS);
+            match self.lobe {
+                LobeKind::Phong => Lobe::Phong(PhongLobe::new(shininess)),
+                LobeKind::BlinnPhong => Lobe::BlinnPhong(BlinnPhongLobe::new(shininess)),
+            }
+        };
+        let ambient = self.ambient.as_ref().map_or(diffuse, color);
+        (PerMoment([diffuse, specular]), ambient, lobe)
+    }
+
+    /// The textures of its colours, and of its numbers.
+    pub(super) fn textures(&self) -> [Option<TextureId>; 4] {
+        let ambient = self.ambient.and_then(|ambient| ambient.texture);
+        [self.diffuse.texture, self.specular.texture, ambient, self.shininess.texture]
+    }
+
+    /// How far the colours of the moments differ all over it, and the answer to ambient light, where `contrast` knows
+    /// that of the textures; `None` where more than colours varies.
+    pub(super) fn contrast(&self, contrast: impl Fn(&Param<Rgb>) -> Option<Rgb>) -> Option<(Colors, Rgb)> {
+        let [diffuse, specular] = [contrast(&self.diffuse)?, contrast(&self.specular)?];
+        let ambient = self.ambient.as_ref().map_or(Some(diffuse), contrast)?;
+        self.shininess.texture.is_none().then_some((PerMoment([diffuse, specular]), ambient))
+    }
+}
