@@ -41,11 +41,12 @@ struct KeptSum {
     pixels: Vec<[f32; 3]>,
 }
 
-/// Sums over the rays of a pixel of all terms but the light of lights.
+/// Sums over the rays of a pixel of all terms but the light of lights. Of a ray with layers each counts as the part of the
+/// ray that ends there.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PixelTerms {
-    /// The number of rays without a hit.
-    pub background: u32,
+    /// The parts of rays that nothing stops: 1 of each without a hit.
+    pub background: f64,
     /// The emission of visible lights.
     pub emission: Emission,
     pub ambient: Rgb,
@@ -56,10 +57,10 @@ pub(crate) struct PixelTerms {
 pub(crate) struct Emission([f64; 3]);
 
 impl Emission {
-    /// Adds the radiance of a light that `rays` rays meet.
-    pub fn add(&mut self, radiance: Rgb, rays: u32) {
+    /// Adds the radiance of a light that `rays` rays meet, parts of rays included.
+    pub fn add(&mut self, radiance: Rgb, rays: f64) {
         for (sum, radiance) in self.0.iter_mut().zip(radiance.to_array()) {
-            *sum += f64::from(radiance) * f64::from(rays);
+            *sum += f64::from(radiance) * rays;
         }
     }
 
@@ -90,7 +91,7 @@ impl ScaledTerm {
 impl PixelTerms {
     /// Adds what a surface emits, and its answer to ambient light, that `rays` rays see.
     pub fn see(&mut self, scene: &Scene, bsdf: &Bsdf, rays: u32) {
-        self.emission.add(bsdf.emission, rays);
+        self.emission.add(bsdf.emission, rays.into());
         self.ambient += bsdf.ambient_light(scene.ambient) * rays as f32;
     }
 

@@ -363,6 +363,25 @@ impl PointSet {
         nearest
     }
 
+    /// Visits every crossing of a sphere, 0 < t < `limit`, with its t and the number of the sphere, until `hit` says so:
+    /// whether it did. `single_sided`: only where the ray enters.
+    #[inline(never)]
+    pub fn each<S: Simd>(
+        &self,
+        simd: S,
+        ray: &DRay,
+        limit: f32,
+        single_sided: bool,
+        mut hit: impl FnMut(f64, u32) -> bool,
+    ) -> bool {
+        let trace = TraceRay::new(ray.o.as_vec3(), ray.d.as_vec3());
+        self.tree.any(simd, &trace, limit, |index| {
+            let Some([enter, leave]) = self.ball(index).roots(ray) else { return false };
+            let within = |t: f64| t > 0.0 && t < f64::from(limit);
+            within(enter) && hit(enter, index) || !single_sided && within(leave) && hit(leave, index)
+        })
+    }
+
     /// Whether any sphere is met between 0 and `limit`.
     #[inline(never)]
     pub fn blocks<S: Simd>(&self, simd: S, ray: &DRay, limit: f32) -> bool {

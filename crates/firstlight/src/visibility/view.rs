@@ -39,6 +39,8 @@ pub(crate) struct ShadowView {
     pub others: Vec<(u32, Aabb)>,
     /// Whether rays have to be traced through all trees.
     pub trees: bool,
+    /// Whether anything that is not opaque may dim some of the light.
+    pub layers: bool,
     /// For each block of sixteen samples, a mask of the hidden ones, in the light's order.
     pub hidden: Vec<u16>,
     leaves: Vec<u32>,
@@ -59,6 +61,7 @@ impl ShadowView {
         self.others.clear();
         self.hidden.clear();
         self.trees = false;
+        self.layers = false;
     }
 
     /// Whether any occluder is tested sample by sample: triangles, and what is in trees.
@@ -112,6 +115,7 @@ impl ShadowView {
             }
         }
         self.trees = occluders.too_many;
+        self.layers = occluders.layers;
         if !occluders.leaves.is_empty() {
             let hidden = dispatch_all!(
                 level,
@@ -126,6 +130,7 @@ impl ShadowView {
         }
         self.gather_others(scene, target, &light, occluders, point);
         let is_clear = self.spheres.is_empty() && self.flats.is_empty() && self.disks.is_empty() && !self.needs_mask();
+        let is_clear = is_clear && !self.layers;
         if is_clear { Visibility::Full } else { Visibility::Partial }
     }
 

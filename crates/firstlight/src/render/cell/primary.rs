@@ -35,7 +35,7 @@ impl CellRenderer<'_> {
         let frustum = TileFrustum::new(scene, square);
         let near = frustum.candidates(scene, candidates);
         if near.is_empty() {
-            let terms = PixelTerms { background: self.rays_per_pixel(), ..PixelTerms::default() };
+            let terms = PixelTerms { background: self.rays_per_pixel().into(), ..PixelTerms::default() };
             for at in self.on_film(square) {
                 let index = self.index(at);
                 terms.resolve(scene, iter::empty(), index, &mut self.sums);
@@ -123,11 +123,11 @@ impl CellRenderer<'_> {
                 false => camera_ray(scene, i * n + k % n, j * n + k / n).1,
             };
             let Some((shape, hit)) = seen(self, at, ray) else {
-                pixel.terms.background += 1;
+                pixel.terms.background += 1.0;
                 continue;
             };
             if let Some(light) = hit.surface.index().checked_sub(scene.geometry.surfaces.len()) {
-                pixel.terms.emission.add(scene.lights[light].radiance, 1);
+                pixel.terms.emission.add(scene.lights[light].radiance, 1.0);
                 continue;
             }
             let point = match shape {
