@@ -52,11 +52,11 @@ impl<'a> Lights<'a> {
         Lights { emitters, integrated, scales, steps, tree, targets, point_sets, obstacles, allowed, least }
     }
 
-    /// Whether anything in trees may occlude light `index`, but for planes that have a closed form.
+    /// Whether anything in trees, or not opaque, may stop some of light `index`, but for planes that have a closed form.
     pub fn has_trees(&self, scene: &Scene, index: usize) -> bool {
         let geometry = &scene.geometry;
         let stops = |thing: &u32| geometry.stops(geometry.placed[*thing as usize].shadow, LightId(index as u32));
-        geometry.has_boxes() || !self.know(index, geometry.unbounded.iter().copied().filter(stops))
+        geometry.is_sampled_past() || !self.know(index, geometry.unbounded.iter().copied().filter(stops))
     }
 
     /// Whether all of these placed shapes have a closed form as occluders of light `index`.

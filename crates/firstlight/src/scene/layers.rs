@@ -85,11 +85,26 @@ impl Scene {
         }
     }
 
+    /// Where a camera ray meets a surface that is not opaque, whatever its alpha there.
+    pub(crate) fn layers_of(&self, ray: &Ray, surface: SurfaceId) -> impl Iterator<Item = Hit> + use<> {
+        let mut found = Vec::new();
+        if self.has_layers() {
+            self.collect_layers(ray, None, &mut found);
+            found.retain(|one| one.hit.surface == surface);
+        }
+        found.into_iter().map(|one| one.hit)
+    }
+
     /// What a camera ray shows: the first layer with an alpha of at least one half before the opaque thing at its
     /// `end`, else that.
     #[inline(always)]
     pub(crate) fn shown(&self, ray: &Ray, differential: &RayDifferential, end: Option<Hit>) -> Option<Hit> {
         if self.has_layers() { self.shown_past_layers(ray, differential, end) } else { end }
+    }
+
+    /// The same of a ray by itself, which stands for a point.
+    pub(super) fn first_shown(&self, ray: &Ray) -> Option<Hit> {
+        self.shown(ray, &RayDifferential::default(), self.intersect_local(ray))
     }
 
     #[inline(never)]
@@ -101,11 +116,12 @@ impl Scene {
     }
 
     /// Calls `found` with the surfaces of all layers on a camera ray with an alpha of at least one half.
-    pub(super) fn meet_all_layers(&self, ray: &Ray, differential: &RayDifferential, mut found: impl FnMut(SurfaceId)) {
+    pub(super) fn meet_all_layers(&self, ray: &Ray, mut found: impl FnMut(SurfaceId)) {
         if self.has_layers() {
             let mut all = Vec::new();
             self.collect_layers(ray, None, &mut all);
-            let is_shown = |one: &&LayerHit| self.layer_at(ray, &one.hit, differential).1 >= HALF;
+            let point = RayDifferential::default();
+            let is_shown = |one: &&LayerHit| self.layer_at(ray, &one.hit, &point).1 >= HALF;
             all.iter().filter(is_shown).for_each(|one| found(one.hit.surface));
         }
     }

@@ -56,7 +56,7 @@ use crate::shape::ShadowTerminator;
 use crate::texture::Texture;
 use far::SceneBall;
 pub(crate) use geometry::{At, Geometry, Nearest, ObjectSpace, Placed, PlacedSpot, PlacedTarget, UpperItem};
-pub(crate) use layers::LayerStack;
+pub(crate) use layers::{Layer, LayerStack};
 pub(crate) use links::LinkId;
 use motion::Motion;
 pub(crate) use occluders::{Listed, ListedOccluders, Opacity};

@@ -49,6 +49,28 @@ impl Geometry {
         self.world.is_some() || !self.items.is_empty()
     }
 
+    /// Whether any light has to be sampled past anything but what is listed: past what [has boxes](Self::has_boxes), or
+    /// is not opaque.
+    #[inline(always)]
+    pub fn is_sampled_past(&self) -> bool {
+        self.has_boxes() || self.layers.is_some()
+    }
+
+    /// Whether camera rays inside of `planes` may meet anything that is not opaque.
+    pub fn may_meet_layers(&self, level: Level, planes: &Planes) -> bool {
+        let Some(layers) = &self.layers else { return false };
+        !layers.unbounded.is_empty()
+            || !dispatch_eight!(level, simd => layers.upper.gather(simd, |center, half| planes.within(center, half).test(), |item| {
+                let UpperItem::Placed(index) = layers.items[item as usize] else { return false };
+                let Placed { placement, target: PlacedTarget::Mesh(mesh), .. } = &self.placed[index as usize] else {
+                    return false;
+                };
+                let own = planes.placed(&placement.world_from_object, &placement.object_from_world);
+                let tree = &self.meshes[*mesh as usize].tree;
+                tree.gather(simd, |center, half| own.within(center, half).test(), |_| false)
+            }))
+    }
+
     /// The boxes around all that lies in trees and has an end.
     pub fn tree_bounds(&self) -> impl Iterator<Item = Aabb> {
         let upper = (!self.items.is_empty()).then(|| self.upper.bounds());

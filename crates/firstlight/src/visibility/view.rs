@@ -7,7 +7,7 @@ use super::occluders::OccluderList;
 use super::shaft::Shaft;
 use super::target::Target;
 use crate::accel::{Aabb, dispatch_all};
-use crate::math::{DVec3, ErrorBound, UNIT_ROUNDOFF, Vec3};
+use crate::math::{DVec3, ErrorBound, LANES, UNIT_ROUNDOFF, Vec3};
 use crate::scene::{PlacedTarget, Scene, ShadowMesh};
 use crate::shape::{
     Cover, DiskShadow, Eye, LightSeen, ParallelogramShadow, Placement, SeenTriangle, SphereShadow, TOGETHER,
@@ -43,6 +43,8 @@ pub(crate) struct ShadowView {
     pub layers: bool,
     /// For each block of sixteen samples, a mask of the hidden ones, in the light's order.
     pub hidden: Vec<u16>,
+    /// For each block of sixteen samples, the part of each that layers let through; empty without layers.
+    pub left: Vec<[f32; LANES]>,
     leaves: Vec<u32>,
     /// The same in the order of the blocks of the target, while it is computed.
     pub(super) in_space: Vec<u16>,
@@ -60,6 +62,7 @@ impl ShadowView {
         self.triangles.clear();
         self.others.clear();
         self.hidden.clear();
+        self.left.clear();
         self.trees = false;
         self.layers = false;
     }

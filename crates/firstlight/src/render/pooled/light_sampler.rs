@@ -30,6 +30,8 @@ use crate::visibility::{ShadowView, Target, Viewpoint};
 /// Points of the smallest set, and of the largest that is kept.
 pub(super) const FEWEST: usize = 16;
 pub(super) const MOST_KEPT: usize = 1 << 11;
+/// Samples of which layers leave parts that differ by less are dimmed alike.
+const SAME_LEFT: f32 = 1.0 / 32.0;
 const SIZES: usize = (MOST_KEPT / FEWEST).ilog2() as usize + 1;
 
 /// The sets of points of one light that are kept, each made when it is first needed: by series and by size, those that
@@ -211,8 +213,31 @@ impl<'a> LightSampler<'a> {
             }
             counts.visibility.traced += packet.trace(self.scene, hide);
         }
+        self.dim(sets, wanted, receivers, counts);
         counts.shadow_rays += points;
         counts.shadow_rays_skipped += points - (counts.visibility.traced - traced_before);
+    }
+
+    /// Finds what layers let through to each receiver of the wanted points of its set.
+    fn dim(&self, sets: &[Cow<LightPoints>], wanted: &[u16], receivers: &mut [SampledReceiver], counts: &mut Counts) {
+        for (receiver, set) in receivers.iter_mut().zip(sets) {
+            let (view, from) = (&mut receiver.view, Viewpoint::of(&receiver.point));
+            view.left.clear();
+            if !view.layers {
+                continue;
+            }
+            view.left.resize(wanted.len(), [1.0; LANES]);
+            for (block, wanted) in wanted.iter().enumerate() {
+                let rest = wanted & !view.hidden.get(block).copied().unwrap_or(0);
+                for lane in (0..LANES).filter(|lane| rest >> lane & 1 == 1) {
+                    let l = set.points.get(block * LANES + lane) - from.p;
+                    if from.horizon.dot(l) > 0.0 {
+                        view.left[block][lane] = self.scene.left_by_layers(&from.ray(self.end(), l, true));
+                        counts.visibility.traced += 1;
+                    }
+                }
+            }
+        }
     }
 
     /// What points at some places of the parameter square would send to a receiver, each for all of the light.
@@ -299,6 +324,22 @@ impl<'a, S: Simd> ReceiverLanes<'a, S> {
         samples
     }
 
+    /// The part of each sample of a block that arrives, where layers dim any: 0 of those that are hidden. Samples that
+    /// are dimmed count as hidden thereby where silhouettes are looked for; where layers dim neighbours differently,
+    /// those that are dimmed more.
+    pub fn dim(&self, samples: &mut BlockSamples, block: usize, left: &[[f32; LANES]]) -> [f32; LANES] {
+        let is_lit = |lane: usize| samples.lit() >> lane & 1 == 1;
+        let of_layers = left.get(block);
+        let left: [f32; LANES] =
+            std::array::from_fn(|lane| if is_lit(lane) { of_layers.map_or(1.0, |left| left[lane]) } else { 0.0 });
+        let sending = (0..LANES).filter(|lane| samples.sends >> lane & 1 == 1);
+        let (least, most) = sending.fold((1.0f32, 0.0f32), |(a, b), lane| (a.min(left[lane]), b.max(left[lane])));
+        let border = if most - least > SAME_LEFT { 0.5 * (least + most) } else { 1.0 };
+        let dimmed = (0..LANES).filter(|lane| left[*lane] < border).fold(0, |bits, lane| bits | 1 << lane);
+        samples.hidden = samples.sends & dimmed;
+        left
+    }
+
     /// The ways to the points of a block.
     #[inline(always)]
     fn ways(&self, simd: S, points: &Points, block: usize) -> Vec3x16<S> {
@@ -370,6 +411,17 @@ impl Packet {
         self.points[lane] = point;
         self.count += 1;
         self.count == LANES
+    }
+
+    /// Calls `dim` with receiver and point of each ray, and what layers let through, where that is not all: those that
+    /// [`trace`](Self::trace) finds blocked included.
+    pub fn dim(&self, scene: &Scene, mut dim: impl FnMut(u32, u32, f32)) {
+        for lane in 0..self.count {
+            let left = scene.left_by_layers(&ShadowRay { l: self.rays.d(lane), ..self.from[lane] });
+            if left < 1.0 {
+                dim(self.receivers[lane], self.points[lane], left);
+            }
+        }
     }
 
     /// Traces the rays through the trees and empties the packet. `hide` takes receiver and point of each ray that is
