@@ -185,12 +185,7 @@ fn hidden_by_trees(
     active: u16,
 ) -> u16 {
     let from = Viewpoint::of(point).ray(to, Vec3::ZERO, true);
-    let o = from.start.to_array().map(|o| [o; LANES]);
-    let mut shadows = ShadowRays { from: &[from], rays: RayPacket16 { o, d: l }, t_end: [0.0; LANES] };
-    for (lane, end) in shadows.t_end.iter_mut().enumerate() {
-        *end = ShadowRay { l: shadows.rays.d(lane), ..from }.end();
-    }
-    geometry.are_blocked(level, &shadows, active)
+    geometry.are_blocked(level, &shadows_from(&from, l), active)
 }
 
 /// The parts of the light along the shadow rays `l` from a point, of the lanes in `active`, that layers let through.
@@ -202,11 +197,19 @@ fn left_by_layers(
     l: &[[f32; LANES]; 3],
     active: u16,
 ) -> [f32; LANES] {
-    let from = Viewpoint::of(point);
-    std::array::from_fn(|lane| {
-        let way = Vec3::new(l[0][lane], l[1][lane], l[2][lane]);
-        if active >> lane & 1 == 1 { scene.left_by_layers(&from.ray(to, way, true)) } else { 0.0 }
-    })
+    let from = Viewpoint::of(point).ray(to, Vec3::ZERO, true);
+    scene.left_by_layers16(&shadows_from(&from, *l), active)
+}
+
+/// Shadow rays `l` from one point.
+fn shadows_from(from: &ShadowRay, l: [[f32; LANES]; 3]) -> ShadowRays<'_> {
+    let o = from.start.to_array().map(|o| [o; LANES]);
+    let mut shadows =
+        ShadowRays { from: std::slice::from_ref(from), rays: RayPacket16 { o, d: l }, t_end: [0.0; LANES] };
+    for (lane, end) in shadows.t_end.iter_mut().enumerate() {
+        *end = ShadowRay { l: shadows.rays.d(lane), ..*from }.end();
+    }
+    shadows
 }
 
 #[inline(always)]

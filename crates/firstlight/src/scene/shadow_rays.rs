@@ -25,7 +25,7 @@ impl ShadowRays<'_> {
         &self.from[lane.min(self.from.len() - 1)]
     }
 
-    fn ray(&self, lane: usize) -> ShadowRay {
+    pub fn ray(&self, lane: usize) -> ShadowRay {
         ShadowRay { l: self.rays.d(lane), ..*self.origin(lane) }
     }
 

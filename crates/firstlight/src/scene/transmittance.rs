@@ -1,15 +1,17 @@
 //! How much light layers let through to a surface: the product over all of them of 1 - alpha, in ascending order of
 //! surface and primitive, so that no traversal decides its bits. Masks are read at their finest level: 0 or 1.
 
+use std::cell::RefCell;
+
 use fearless_simd::{Level, Simd};
 
 use super::Scene;
 use super::geometry::{At, Geometry, Hit, PlacedSpot, PlacedTarget, UpperItem};
-use super::shadow_rays::ShadowMesh;
-use crate::accel::{TraceRay, dispatch_eight};
+use super::shadow_rays::{ShadowMesh, ShadowRays};
+use crate::accel::{TraceRay, dispatch_eight, dispatch_sixteen};
 use crate::ids::SurfaceId;
-use crate::math::{DRay, Ray, ShadowRay};
-use crate::shape::{RayDifferential, ShadowTerminator, TrianglePoint};
+use crate::math::{DRay, LANES, Ray, ShadowRay};
+use crate::shape::{RayDifferential, ShadowTerminator, TrianglePoint, bits};
 
 /// What is left of light by the layers on a ray.
 struct Veils<'a> {
@@ -45,6 +47,36 @@ impl Scene {
         if self.geometry.pass_layers(self.level, &mut veils) { 0.0 } else { veils.product() }
     }
 }
+
+impl Scene {
+    /// The parts of the light along the shadow rays in `active` that layers let through: the same as those of single
+    /// rays.
+    #[inline(never)]
+    pub(crate) fn left_by_layers16(&self, shadows: &ShadowRays, active: u16) -> [f32; LANES] {
+        let geometry = &*self.geometry;
+        let rays: [ShadowRay; LANES] = std::array::from_fn(|lane| shadows.ray(lane));
+        let mut veils = rays.each_ref().map(|ray| Veils { scene: self, ray, factors: Vec::new() });
+        let stopped = dispatch_sixteen!(
+            self.level,
+            simd => geometry.pass_layers16(simd, shadows, active, &RefCell::new(&mut veils)),
+            else {
+                let is_stopped = |lane: &usize| geometry.pass_layers(self.level, &mut veils[*lane]);
+                let lanes = (0..LANES).filter(|lane| active >> lane & 1 == 1);
+                lanes.filter(is_stopped).fold(0, |bits, lane| bits | 1 << lane)
+            }
+        );
+        let mut left = [0.0; LANES];
+        for (lane, (left, veils)) in left.iter_mut().zip(veils).enumerate() {
+            if active >> lane & 1 == 1 && stopped >> lane & 1 == 0 {
+                *left = veils.product();
+            }
+        }
+        left
+    }
+}
+
+/// The veils of sixteen rays, for filters of trees, which cannot change what they hold.
+type LaneVeils<'a, 'b> = RefCell<&'a mut [Veils<'b>; LANES]>;
 
 impl Veils<'_> {
     /// Adds a layer; whether it stops all light.
@@ -104,15 +136,85 @@ impl Geometry {
         if layers.unbounded.iter().any(|thing| self.pass_placed_layer(simd, *thing, veils)) {
             return true;
         }
-        let end = f64::from(ray.end());
         layers.upper.any(simd, &TraceRay::new(ray.start, ray.l), ray.t_max, |item| match layers.items[item as usize] {
+            item @ (UpperItem::Sphere(_) | UpperItem::Parallelogram(_)) => self.pass_listed_layer(item, veils),
+            UpperItem::Placed(i) => self.pass_placed_layer(simd, i, veils),
+        })
+    }
+
+    /// The same for the rays in `active`: those that a layer stops.
+    #[inline(always)]
+    fn pass_layers16<S: Simd>(&self, simd: S, shadows: &ShadowRays, active: u16, veils: &LaneVeils) -> u16 {
+        let Some(layers) = &self.layers else { return 0 };
+        let mut done = 0;
+        for thing in &layers.unbounded {
+            done |= self.pass_placed_layer16(simd, *thing, shadows, active & !done, veils);
+        }
+        let whole = [shadows.from[0].t_max; LANES];
+        done | layers.upper.any16(simd, &shadows.rays, &whole, active & !done, |item, asking| {
+            match layers.items[item as usize] {
+                UpperItem::Placed(i) => self.pass_placed_layer16(simd, i, shadows, asking, veils),
+                item => one_by_one(asking, |lane| self.pass_listed_layer(item, &mut veils.borrow_mut()[lane])),
+            }
+        })
+    }
+
+    #[inline(never)]
+    fn pass_placed_layer16<S: Simd>(
+        &self,
+        simd: S,
+        index: u32,
+        shadows: &ShadowRays,
+        active: u16,
+        veils: &LaneVeils,
+    ) -> u16 {
+        let thing = &self.placed[index as usize];
+        let PlacedTarget::Mesh(_) = thing.target else {
+            return one_by_one(active, |lane| self.pass_placed_layer(simd, index, &mut veils.borrow_mut()[lane]));
+        };
+        let light = shadows.from[0].to.light;
+        let Some(mesh) = ShadowMesh::of(self, index + 1, light).filter(|_| self.stops(thing.shadow, light)) else {
+            return 0;
+        };
+        let own = mesh.own_rays(&shadows.rays, active);
+        let rays = own.as_ref().unwrap_or(&shadows.rays);
+        let stops = |triangle, hit: u64| {
+            if !mesh.casts(triangle) {
+                return 0;
+            }
+            let veils = &mut *veils.borrow_mut();
+            let corners = mesh.mesh.corners(triangle).map(|corner| corner.as_vec3());
+            let surface = SurfaceId(thing.surface.0 + mesh.mesh.part(triangle).surface);
+            let is_stopped = |lane: &usize| {
+                let ray = &mut veils[*lane];
+                !mesh.is_start(ray.ray, rays.o(*lane), triangle)
+                    && mesh.mesh.tree.meet(&rays.ray(*lane), &corners, triangle).is_some_and(|hit| {
+                        let point = TrianglePoint { triangle, u: hit.u, v: hit.v };
+                        let at = At::Placed(index, PlacedSpot::Triangle(point));
+                        ray.add(Hit { t: f64::from(hit.t), surface, at })
+                    })
+            };
+            bits(hit).filter(is_stopped).fold(0, |stopped, lane| stopped | 1 << lane)
+        };
+        simd.vectorize(
+            #[inline(always)]
+            || mesh.mesh.tree.any16(simd, rays, &shadows.t_end, active, &stops),
+        )
+    }
+
+    /// A sphere or a parallelogram of [`pass_layers`](Self::pass_layers).
+    #[inline(never)]
+    fn pass_listed_layer(&self, item: UpperItem, veils: &mut Veils) -> bool {
+        let ray = veils.ray;
+        match item {
             UpperItem::Sphere(i) => {
                 let owned = &self.spheres[i as usize];
                 let line = DRay { o: ray.start.as_dvec3(), d: ray.l.as_dvec3() };
+                let within = [0.0, f64::from(ray.end())];
                 self.casts(owned.surface, ray.to.light)
                     && owned
                         .shape
-                        .crossings(&line, [0.0, end], false)
+                        .crossings(&line, within, false)
                         .into_iter()
                         .flatten()
                         .any(|t| veils.add(Hit { t, surface: owned.surface, at: At::Sphere(i) }))
@@ -125,8 +227,8 @@ impl Geometry {
                     && owned.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite())
                     && veils.add(Hit { t: crossing(), surface: owned.surface, at: At::Parallelogram(i) })
             }
-            UpperItem::Placed(i) => self.pass_placed_layer(simd, i, veils),
-        })
+            UpperItem::Placed(_) => false,
+        }
     }
 
     #[inline(never)]
@@ -174,4 +276,10 @@ impl Geometry {
             }
         }
     }
+}
+
+/// Those of the lanes in `active` that are `stopped`.
+#[inline(always)]
+fn one_by_one(active: u16, mut stopped: impl FnMut(usize) -> bool) -> u16 {
+    bits(active.into()).filter(|lane| stopped(*lane)).fold(0, |mask, lane| mask | 1 << lane)
 }

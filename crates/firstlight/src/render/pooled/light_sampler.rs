@@ -220,24 +220,31 @@ impl<'a> LightSampler<'a> {
 
     /// Finds what layers let through to each receiver of the wanted points of its set.
     fn dim(&self, sets: &[Cow<LightPoints>], wanted: &[u16], receivers: &mut [SampledReceiver], counts: &mut Counts) {
-        for (receiver, set) in receivers.iter_mut().zip(sets) {
-            let (view, from) = (&mut receiver.view, Viewpoint::of(&receiver.point));
-            view.left.clear();
-            if !view.layers {
-                continue;
+        let mut dimmed = Vec::new();
+        for (number, receiver) in receivers.iter_mut().enumerate() {
+            receiver.view.left.clear();
+            if receiver.view.layers {
+                receiver.view.left.resize(wanted.len(), [1.0; LANES]);
+                dimmed.push((number as u32, Viewpoint::of(&receiver.point)));
             }
-            view.left.resize(wanted.len(), [1.0; LANES]);
-            for (block, wanted) in wanted.iter().enumerate() {
-                let rest = wanted & !view.hidden.get(block).copied().unwrap_or(0);
-                for lane in (0..LANES).filter(|lane| rest >> lane & 1 == 1) {
-                    let l = set.points.get(block * LANES + lane) - from.p;
-                    if from.horizon.dot(l) > 0.0 {
-                        view.left[block][lane] = self.scene.left_by_layers(&from.ray(self.end(), l, true));
-                        counts.visibility.traced += 1;
-                    }
+        }
+        let Some((_, any)) = dimmed.first() else { return };
+        let mut packet = Packet::new(self.end(), any);
+        // The rays to one stratum are nearly parallel
+        let is_wanted = |k: &usize| wanted[k / LANES] >> (k % LANES) & 1 == 1;
+        for k in (0..wanted.len() * LANES).filter(is_wanted) {
+            for (number, point) in &dimmed {
+                let hidden = receivers[*number as usize].view.hidden.get(k / LANES).copied().unwrap_or(0);
+                let l = sets[*number as usize].points.get(k) - point.p;
+                if hidden >> (k % LANES) & 1 == 0
+                    && point.horizon.dot(l) > 0.0
+                    && packet.add(*number, point, l, k as u32)
+                {
+                    counts.visibility.traced += packet.dim_all(self.scene, receivers);
                 }
             }
         }
+        counts.visibility.traced += packet.dim_all(self.scene, receivers);
     }
 
     /// What points at some places of the parameter square would send to a receiver, each for all of the light.
@@ -416,33 +423,51 @@ impl Packet {
     /// Calls `dim` with receiver and point of each ray, and what layers let through, where that is not all: those that
     /// [`trace`](Self::trace) finds blocked included.
     pub fn dim(&self, scene: &Scene, mut dim: impl FnMut(u32, u32, f32)) {
-        for lane in 0..self.count {
-            let left = scene.left_by_layers(&ShadowRay { l: self.rays.d(lane), ..self.from[lane] });
-            if left < 1.0 {
-                dim(self.receivers[lane], self.points[lane], left);
-            }
+        if self.count == 0 {
+            return;
         }
+        let (shadows, all) = self.shadows();
+        let left = scene.left_by_layers16(&shadows, all);
+        for lane in (0..self.count).filter(|lane| left[*lane] < 1.0) {
+            dim(self.receivers[lane], self.points[lane], left[lane]);
+        }
+    }
+
+    /// Stores what layers leave of each ray in the views of its receiver, and empties the packet. Returns the number of
+    /// rays.
+    fn dim_all(&mut self, scene: &Scene, receivers: &mut [SampledReceiver]) -> u64 {
+        self.dim(scene, |receiver, point, left| {
+            let lanes = &mut receivers[receiver as usize].view.left[point as usize / LANES];
+            lanes[point as usize % LANES] = left;
+        });
+        std::mem::take(&mut self.count) as u64
+    }
+
+    /// Its rays, and which lanes have one.
+    fn shadows(&self) -> (ShadowRays<'_>, u16) {
+        let mut t_end = [0.0; LANES];
+        for (lane, t_end) in t_end.iter_mut().enumerate().take(self.count) {
+            *t_end = ShadowRay { l: self.rays.d(lane), ..self.from[lane] }.end();
+        }
+        let all = ((1u32 << self.count) - 1) as u16;
+        (ShadowRays { from: &self.from, rays: self.rays.clone(), t_end }, all)
     }
 
     /// Traces the rays through the trees and empties the packet. `hide` takes receiver and point of each ray that is
     /// blocked. Returns the number of rays.
     pub fn trace(&mut self, scene: &Scene, mut hide: impl FnMut(u32, u32)) -> u64 {
-        let count = std::mem::take(&mut self.count);
+        let count = self.count;
         if count == 0 {
             return 0;
         }
-        let mut t_end = [0.0; LANES];
-        for (lane, t_end) in t_end.iter_mut().enumerate().take(count) {
-            *t_end = ShadowRay { l: self.rays.d(lane), ..self.from[lane] }.end();
-        }
-        let shadows = ShadowRays { from: &self.from, rays: self.rays.clone(), t_end };
-        let all = ((1u32 << count) - 1) as u16;
+        let (shadows, all) = self.shadows();
         let mut hidden = scene.geometry.are_blocked(scene.level, &shadows, all);
         while hidden != 0 {
             let lane = hidden.trailing_zeros() as usize % LANES;
             hidden &= hidden - 1;
             hide(self.receivers[lane], self.points[lane]);
         }
+        self.count = 0;
         count as u64
     }
 }

@@ -315,6 +315,12 @@ impl TriangleTree {
         self.any_below(simd, 0, ray, &self.slabs(ray), t_max, filter)
     }
 
+    /// Where a ray meets a triangle with these corners, which it is known to meet.
+    pub fn meet(&self, ray: &TraceRay, corners: &[Vec3; 3], triangle: u32) -> Option<TriangleHit> {
+        let Crossing { t, u, v } = intersect(ray, &self.slabs(ray), corners)?;
+        Some(TriangleHit { t, u, v, triangle })
+    }
+
     /// Visits every triangle on a ray, 0 < t <= `t_max`, in no order, until `hit` says so: whether it did.
     #[inline(always)]
     pub fn each<S: Simd>(&self, simd: S, ray: &TraceRay, t_max: f32, mut hit: impl FnMut(TriangleHit) -> bool) -> bool {
