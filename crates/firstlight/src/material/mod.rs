@@ -101,7 +101,7 @@ impl Material {
     /// The material in numbers at one surface.
     #[inline]
     pub fn bsdf(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Bsdf {
-        self.evaluate(|param| param.color(si, textures) * si.color, |param| param.number(si, textures))
+        self.evaluate(|param| param.color(si, textures) * si.color, |param| param.number(si, textures, 1.0))
     }
 
     /// The same on any surface, if it has no texture.
