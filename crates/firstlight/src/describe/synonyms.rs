@@ -77,6 +77,7 @@ pub(crate) const SYNONYMS: &[(&[&str], &str, &str)] = &[
         "shininess",
         "the exponent of the highlight: larger is smoother",
     ),
+    (&["space", "colorspace", "colour_space", "encoding"], "color_space", "what the picture's numbers mean"),
     (&["filename", "path", "src", "url", "image"], "file", ""),
     (&["vertices", "points", "verts", "vertex"], "positions", ""),
     (&["indices", "faces", "tris"], "triangles", ""),

@@ -23,36 +23,34 @@ words! {
 /// The alpha of a material that is not opaque.
 #[derive(Clone, Copy, Debug)]
 pub struct Alpha {
-    /// 0 lets all light through, 1 none.
+    /// 0 lets all light through, 1 none; of a mask the share that is there.
     pub value: Param<f32>,
-    /// Of a mask: the least alpha at which the surface is there.
+    /// Of a mask: the least alpha of the vertices at which the surface is there.
     pub cutoff: Option<f32>,
 }
 
 impl Alpha {
     /// The part of a camera ray that the surface stops, 0 to 1: of a mask the share of the footprint that is there.
     pub(crate) fn at_surface(&self, si: &SurfaceInteraction, textures: &[Texture]) -> f32 {
-        match self.cutoff {
-            None => bounded(self.value.number(si, textures) * si.alpha),
-            Some(cutoff) => match self.value.texture {
-                None => is_there(self.value.factor * si.alpha, cutoff),
-                Some(id) => {
-                    let factor = self.value.factor * si.alpha;
-                    bounded(textures[id.index()].share(si, |texel| texel * factor >= cutoff))
-                }
-            },
-        }
+        let value = self.value.number(si, textures, 1.0);
+        bounded(value * self.of_vertex(si.alpha))
     }
 
     /// The part of a shadow ray that the surface stops where it has such a texture coordinate and vertex alpha: 0 or 1
     /// of a mask. Textures are read at their finest level.
     pub(crate) fn at_point(&self, uv: Vec2, vertex: f32, textures: &[Texture]) -> f32 {
-        let texel = self.value.texture.map_or(1.0, |id| textures[id.index()].finest(uv));
-        let alpha = texel * (self.value.factor * vertex);
-        match self.cutoff {
-            None => bounded(alpha),
-            Some(cutoff) => is_there(alpha, cutoff),
-        }
+        let texture = self.value.texture.map(|id| &textures[id.index()]);
+        let value = match (texture, self.cutoff) {
+            (None, _) => self.value.factor,
+            (Some(texture), None) => self.value.of(texture.at(uv)),
+            (Some(texture), Some(_)) => f32::from(texture.is_solid(uv)),
+        };
+        bounded(value * self.of_vertex(vertex))
+    }
+
+    /// What the alpha of vertices multiplies.
+    fn of_vertex(&self, alpha: f32) -> f32 {
+        self.cutoff.map_or(alpha, |cutoff| is_there(alpha, cutoff))
     }
 }
 

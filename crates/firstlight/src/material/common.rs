@@ -3,7 +3,7 @@
 use super::{Alpha, AlphaMode};
 use crate::color::Rgb;
 use crate::context::CompileContext;
-use crate::describe::{ColorParam, NumberParam, table};
+use crate::describe::{Channel, ColorParam, NumberParam, table};
 use crate::ids::TextureId;
 use crate::shape::SurfaceInteraction;
 use crate::texture::{Param, Params, Texture};
@@ -18,7 +18,8 @@ table! {
         pub emissive: ColorParam = ColorParam::gray(0.0),
         /// Multiplies `emissive`: 0 to 1e6.
         pub emissive_strength: f64 = 1.0,
-        /// How much of the light behind the surface it stops: 0 to 1. The alpha of a mesh's vertices multiplies it.
+        /// How much of the light behind the surface it stops: 0 to 1. The alpha of the vertices of a mesh multiplies
+        /// that of a blend; a mask is there where both are at or above the cutoff.
         pub alpha: NumberParam = NumberParam::constant(1.0),
         /// What is made of `alpha`.
         pub alpha_mode: AlphaMode = AlphaMode::Opaque,
@@ -51,9 +52,8 @@ impl MaterialCommonDesc {
     }
 
     fn compile_alpha(&self, cx: &mut CompileContext, params: &mut impl Params) -> Option<Alpha> {
-        let value = params.number(cx, "alpha", &self.alpha, [0.0, 1.0]);
         let hint = "a mask is there where its alpha is this or more";
-        let cutoff = cx.between("cutoff", self.cutoff, 0.0, 1.0, Some(hint)) as f32;
+        let cutoff = cx.between("cutoff", self.cutoff, 0.0, 1.0, Some(hint));
         match self.alpha_mode {
             AlphaMode::Opaque => {
                 if self.alpha != NumberParam::constant(1.0) {
@@ -62,16 +62,25 @@ impl MaterialCommonDesc {
                 }
                 None
             }
-            AlphaMode::Mask => Some(Alpha { value, cutoff: Some(cutoff) }),
-            AlphaMode::Blend => Some(Alpha { value, cutoff: None }),
+            AlphaMode::Mask => {
+                let share = params.mask(cx, "alpha", &self.alpha, cutoff);
+                Some(Alpha { value: share, cutoff: Some(cutoff as f32) })
+            }
+            AlphaMode::Blend => {
+                let value = params.number(cx, "alpha", &self.alpha, [0.0, 1.0]);
+                Some(Alpha { value, cutoff: None })
+            }
         }
     }
 }
 
 impl MaterialCommon {
     /// That of materials that say nothing of it.
-    pub(super) const NONE: MaterialCommon =
-        MaterialCommon { emissive: Param { texture: None, factor: Rgb::BLACK }, alpha: None, single_sided: false };
+    pub(super) const NONE: MaterialCommon = MaterialCommon {
+        emissive: Param { texture: None, factor: Rgb::BLACK, channel: Channel::R, bias: 0.0 },
+        alpha: None,
+        single_sided: false,
+    };
 
     /// The radiance that it emits at a surface.
     #[inline]

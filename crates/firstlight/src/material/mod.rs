@@ -73,7 +73,8 @@ impl Material {
     /// The material in numbers at one surface.
     #[inline]
     pub fn bsdf(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Bsdf {
-        let mut bsdf = self.evaluate(|param| param.color(si, textures) * si.color, |param| param.number(si, textures));
+        let mut bsdf =
+            self.evaluate(|param| param.color(si, textures) * si.color, |param| param.number(si, textures, 1.0));
         bsdf.emission = self.common.emission(si, textures);
         bsdf
     }

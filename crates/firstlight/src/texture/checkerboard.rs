@@ -66,24 +66,6 @@ impl Checkerboard {
         self.colors[0] * (0.5 * (1.0 + mean)) + self.colors[1] * (0.5 * (1.0 - mean))
     }
 
-    /// The share of the footprint around `uv` that has colours which are `counted`.
-    pub(crate) fn share(&self, uv: Vec2, footprint: &Footprint, counted: impl Fn(Rgb) -> bool) -> f32 {
-        match self.colors.map(counted) {
-            [true, true] => 1.0,
-            [false, false] => 0.0,
-            [first, _] => {
-                let mean = self.mean(uv, footprint) as f32;
-                0.5 * (1.0 + if first { mean } else { -mean })
-            }
-        }
-    }
-
-    /// The colour at `uv` alone.
-    pub(crate) fn color_at(&self, uv: Vec2) -> Rgb {
-        let nothing = Footprint { dx: Vec2::ZERO, dy: Vec2::ZERO, edges: [UvEdge::Unbounded; 2] };
-        self.color(uv, &nothing)
-    }
-
     /// How far its two colours differ.
     pub(crate) fn contrast(&self) -> Rgb {
         (self.colors[0] + self.colors[1] * -1.0).map(f32::abs)
