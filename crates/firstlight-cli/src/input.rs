@@ -317,6 +317,7 @@ impl Input {
             light: self.is_model,
             progress,
             cache: None,
+            ..CompileOptions::default()
         };
         self.parsed.compile(&self.assets, &options).map_err(|e| Failure::Scene(e.faults))
     }

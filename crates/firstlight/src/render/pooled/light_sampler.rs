@@ -240,11 +240,11 @@ impl<'a> LightSampler<'a> {
                     && point.horizon.dot(l) > 0.0
                     && packet.add(*number, point, l, k as u32)
                 {
-                    counts.visibility.traced += packet.dim_all(self.scene, receivers);
+                    counts.shadow_rays += packet.dim_all(self.scene, receivers);
                 }
             }
         }
-        counts.visibility.traced += packet.dim_all(self.scene, receivers);
+        counts.shadow_rays += packet.dim_all(self.scene, receivers);
     }
 
     /// What points at some places of the parameter square would send to a receiver, each for all of the light.

@@ -50,6 +50,8 @@ shape_table! {
         pub uv_set: u32 = 0,
         /// A colour for each vertex, linear Rec. 709.
         pub colors: Vec<[f64; 3]> = Vec::new(),
+        /// An alpha for each vertex, 0 to 1; without, 1.
+        pub alphas: Vec<f64> = Vec::new(),
         /// The names of materials that `face_materials` chooses from.
         pub materials: Vec<String> = Vec::new(),
         /// The material of each triangle, as a position in `materials`, counted from 0.
@@ -231,13 +233,24 @@ impl MeshDesc {
         (smooth, key)
     }
 
-    fn lists(&self) -> [(&'static str, bool); 7] {
+    /// The colour and the alpha of each vertex; none if neither is said.
+    fn vertex_colors(&self) -> Vec<[f32; 4]> {
+        let said = if self.alphas.is_empty() { self.colors.len() } else { self.positions.len() };
+        let of_vertex = |i: usize| {
+            let [r, g, b] = self.colors.get(i).copied().unwrap_or([1.0; 3]);
+            [r, g, b, self.alphas.get(i).copied().unwrap_or(1.0)].map(|c| c as f32)
+        };
+        (0..said).map(of_vertex).collect()
+    }
+
+    fn lists(&self) -> [(&'static str, bool); 8] {
         [
             ("positions", !self.positions.is_empty()),
             ("triangles", !self.triangles.is_empty()),
             ("normals", !self.normals.is_empty()),
             ("uvs", !self.uvs.is_empty()),
             ("colors", !self.colors.is_empty()),
+            ("alphas", !self.alphas.is_empty()),
             ("materials", !self.materials.is_empty()),
             ("face_materials", !self.face_materials.is_empty()),
         ]
@@ -252,8 +265,13 @@ impl MeshDesc {
             cx.error(field, "there is neither a file nor both positions and triangles", Some(hint));
         }
         let vertices = self.positions.len();
-        for (field, length) in [("normals", self.normals.len()), ("uvs", self.uvs.len()), ("colors", self.colors.len())]
-        {
+        let of_vertices = [
+            ("normals", self.normals.len()),
+            ("uvs", self.uvs.len()),
+            ("colors", self.colors.len()),
+            ("alphas", self.alphas.len()),
+        ];
+        for (field, length) in of_vertices {
             if length != 0 && length != vertices {
                 let message = format!("{length} of them for {vertices} positions");
                 cx.error(field, message, Some("give one for each vertex, or none"));
@@ -279,6 +297,9 @@ impl MeshDesc {
                 let message = format!("{} is outside [0, 1e6]", show(color));
                 cx.error(&format!("colors[{i}]"), message, Some("a colour is linear red, green, blue"));
             }
+        }
+        for (i, alpha) in self.alphas.iter().enumerate().filter(|(i, _)| is_used(*i)) {
+            cx.between(&format!("alphas[{i}]"), *alpha, 0.0, 1.0, Some("0 lets all light through, 1 none"));
         }
         let normals = self.normals.iter().enumerate().map(|(i, normal)| ("normals", i, &normal[..]));
         let uvs = self.uvs.iter().enumerate().map(|(i, uv)| ("uvs", i, &uv[..]));
@@ -312,7 +333,7 @@ impl MeshDesc {
             } else {
                 vec![self.uvs.iter().map(|uv| uv.map(|c| c as f32)).collect()]
             },
-            colors: self.colors.iter().map(|c| [c[0] as f32, c[1] as f32, c[2] as f32, 1.0]).collect(),
+            colors: self.vertex_colors(),
             triangles: self.triangles.clone(),
             face_materials: self.face_materials.clone(),
             materials: self.materials.clone(),
