@@ -3,6 +3,8 @@
 mod checkerboard;
 mod filter;
 mod image;
+#[cfg(test)]
+mod filter_tests;
 mod pyramid;
 mod texels;
 
