@@ -7,9 +7,11 @@ mod image;
 mod filter_tests;
 mod pyramid;
 mod texels;
+mod uv_grid;
 
 pub use checkerboard::{Checkerboard, CheckerboardDesc};
 pub use image::{Filter, ImageTexture, ImageTextureDesc, TextureSpace, Wrap};
+pub use uv_grid::UvGridDesc;
 
 pub(crate) use pyramid::{MaskRule, Pyramid, TextureUse};
 
@@ -27,6 +29,8 @@ family! {
         Checkerboard(CheckerboardDesc) = "checkerboard",
         /// `[texture.image.NAME]`
         Image(ImageTextureDesc) = "image",
+        /// `[texture.uv-grid.NAME]`
+        UvGrid(UvGridDesc) = "uv-grid",
     }
 }
 
@@ -35,7 +39,7 @@ family! {
 pub enum Texture {
     /// `[texture.checkerboard.NAME]`
     Checkerboard(Checkerboard),
-    /// `[texture.image.NAME]`
+    /// `[texture.image.NAME]`, and the picture of a `[texture.uv-grid.NAME]`
     Image(ImageTexture),
 }
 
