@@ -112,7 +112,7 @@ pub use shape::{
     ParallelogramDesc, PlaneDesc, PointSetDesc, RayDifferential, RectangleShapeDesc, ShadowTerminator, ShapeDesc,
     SphereDesc, SphereUv, TorusDesc, UvEdge,
 };
-pub use texture::{CheckerboardDesc, Filter, ImageTextureDesc, TextureDesc, TextureSpace, Wrap};
+pub use texture::{CheckerboardDesc, Filter, ImageTextureDesc, TextureDesc, TextureSpace, UvGridDesc, Wrap};
 pub use transform::{Interpolation, TransformDesc, TransformKeyDesc};
 
 /// The code of the book and of the README is compiled, and run where that takes no files.

@@ -72,16 +72,14 @@ fn color() -> impl Strategy<Value = ColorDesc> {
 }
 
 fn color_param() -> impl Strategy<Value = ColorParam> {
-    (proptest::option::of(text()), color(), 0..3u32).prop_map(|(texture, factor, uv_set)| {
-        let uv_set = if texture.is_some() { uv_set } else { 0 };
-        ColorParam { texture, uv_set, ..ColorParam::constant(factor) }
-    })
+    (proptest::option::of(text()), color())
+        .prop_map(|(texture, factor)| ColorParam { texture, ..ColorParam::constant(factor) })
 }
 
 fn number_param() -> impl Strategy<Value = NumberParam> {
-    (proptest::option::of(text()), number(), select(Channel::ALL), number(), 0..3u32).prop_map(
-        |(texture, factor, channel, bias, uv_set)| match texture {
-            Some(_) => NumberParam { texture, factor, channel, bias, uv_set },
+    (proptest::option::of(text()), number(), select(Channel::ALL), number()).prop_map(
+        |(texture, factor, channel, bias)| match texture {
+            Some(_) => NumberParam { texture, factor, channel, bias },
             None => NumberParam::constant(factor),
         },
     )
@@ -354,8 +352,11 @@ fn light() -> impl Strategy<Value = LightDesc> {
 }
 
 fn material() -> impl Strategy<Value = MaterialDesc> {
-    let common = (color_param(), number())
-        .prop_map(|(emissive, emissive_strength)| MaterialCommonDesc { emissive, emissive_strength });
+    let common = (color_param(), number()).prop_map(|(emissive, emissive_strength)| MaterialCommonDesc {
+        emissive,
+        emissive_strength,
+        ..MaterialCommonDesc::default()
+    });
     (any::<bool>(), color_param(), color_param(), maybe(color_param()), number_param(), common).prop_map(
         |(blinn, diffuse, specular, ambient, shininess, common)| match blinn {
             true => MaterialDesc::BlinnPhong(BlinnPhongDesc { diffuse, specular, ambient, shininess, common }),
@@ -379,7 +380,8 @@ fn texture() -> impl Strategy<Value = TextureDesc> {
             let new = ImageTextureDesc { rotate_deg: scale[1], ..ImageTextureDesc::new(file.into()) };
             TextureDesc::Image(ImageTextureDesc { wrap, filter, color_space, border, scale, offset, ..new })
         });
-    prop_oneof![checkerboard, image]
+    let grid = any::<[u32; 2]>().prop_map(|counts| TextureDesc::UvGrid(UvGridDesc { counts }));
+    prop_oneof![checkerboard, image, grid]
 }
 
 prop_compose! {

@@ -394,3 +394,35 @@ fn pictures_with_layers_are_lit_again() {
     let same = relight(&file, &[("ball".into(), LightChange::Times(1.0))]).unwrap();
     assert!(same.image.pixels == picture(&before, &sampled).pixels);
 }
+
+#[test]
+fn many_lights_are_half_behind_a_sheet() {
+    let lamps: String = (0..20)
+        .map(|k| format!("[[light.point]]\nposition = [{}, 1, 4]\nstrength = 0.5\n", f64::from(k) * 0.1 - 1.0))
+        .collect();
+    let floor = "[[parallelogram]]\np = [-3, -3, 0]\ne0 = [6, 0, 0]\ne1 = [0, 6, 0]\n";
+    let lid = |material: &str| wall(2.0, material) + "visible = false\n";
+    let open = pixel(&format!("{floor}{lamps}"), "")[0];
+    let behind = pixel(&format!("{floor}{lamps}{}", lid("sheet")), "")[0];
+    assert!((behind - 0.5 * open).abs() < 1e-4 * open, "{behind} of {open}");
+}
+
+#[test]
+fn what_is_out_of_range_is_refused_and_what_does_nothing_is_spoken_of() {
+    let compiled = |fields: &str| {
+        let text = format!(
+            "{CAMERA}[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"m\"\n[material.phong.m]\n{fields}"
+        );
+        SceneDesc::parse("s.toml", text.as_bytes(), &NoAssets).compile(&NoAssets, &CompileOptions::default())
+    };
+    for (fields, path) in [
+        ("alpha_mode = \"mask\"\ncutoff = 1.5", "material.phong.m.cutoff"),
+        ("alpha_mode = \"blend\"\nalpha = -0.1", "material.phong.m.alpha"),
+        ("alpha_mode = \"veil\"", "material.phong.m.alpha_mode"),
+    ] {
+        let error = compiled(fields).expect_err(fields);
+        assert_eq!(error.faults.iter().map(|fault| &fault.path[..]).collect::<Vec<_>>(), [path], "{fields}");
+    }
+    let advice = compiled("alpha = 0.5").unwrap().advice;
+    assert!(advice.iter().any(|one| one.path == "material.phong.m.alpha"), "{advice:?}");
+}

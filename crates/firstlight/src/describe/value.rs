@@ -310,8 +310,6 @@ pub struct ParamDesc<T> {
     pub channel: Channel,
     /// Added to a number after the factor, from -1e6 to 1e6; 0 unless said. Of colours nothing.
     pub bias: f64,
-    /// Which uv set of a mesh the texture is looked up with: 0, the mesh's own, unless said.
-    pub uv_set: u32,
 }
 
 /// A colour that a texture can drive.
@@ -322,7 +320,7 @@ pub type NumberParam = ParamDesc<f64>;
 impl<T> ParamDesc<T> {
     /// The same everywhere.
     pub const fn constant(value: T) -> Self {
-        Self { texture: None, factor: value, channel: Channel::R, bias: 0.0, uv_set: 0 }
+        Self { texture: None, factor: value, channel: Channel::R, bias: 0.0 }
     }
 }
 
@@ -372,12 +370,12 @@ trait Factor: Value {
 
 impl Factor for f64 {
     const ONE: Self = 1.0;
-    const KEYS: &'static [&'static str] = &["texture", "channel", "factor", "bias", "uv_set"];
+    const KEYS: &'static [&'static str] = &["texture", "channel", "factor", "bias"];
 }
 
 impl Factor for ColorDesc {
     const ONE: Self = ColorDesc::WHITE;
-    const KEYS: &'static [&'static str] = &["texture", "factor", "uv_set"];
+    const KEYS: &'static [&'static str] = &["texture", "factor"];
 }
 
 impl<T: Factor> Value for ParamDesc<T> {
@@ -390,7 +388,7 @@ impl<T: Factor> Value for ParamDesc<T> {
     }
 
     fn schema() -> Json {
-        let mut properties = json!({ "texture": { "type": "string" }, "factor": T::schema(), "uv_set": u32::schema() });
+        let mut properties = json!({ "texture": { "type": "string" }, "factor": T::schema() });
         if T::KEYS.contains(&"channel") {
             (properties["channel"], properties["bias"]) = (Channel::schema(), f64::schema());
         }
@@ -421,7 +419,7 @@ impl<T: Factor> Value for ParamDesc<T> {
                 None
             }
         };
-        let found = ["factor", "channel", "bias", "uv_set"]
+        let found = ["factor", "channel", "bias"]
             .map(|key| node.get(key).filter(|_| T::KEYS.contains(&key)).map(|node| (node, key)));
         fn value<V: Value>(found: Option<(&Node, &str)>, reader: &mut Reader<'_>, default: V) -> Option<V> {
             found.map_or(Some(default), |(node, key)| reader.within(key, |r| V::read(node, r)))
@@ -429,8 +427,7 @@ impl<T: Factor> Value for ParamDesc<T> {
         let factor = value(found[0], reader, T::ONE);
         let channel = value(found[1], reader, Channel::R);
         let bias = value(found[2], reader, 0.0);
-        let uv_set = value(found[3], reader, 0);
-        Some(Self { texture: Some(texture?), factor: factor?, channel: channel?, bias: bias?, uv_set: uv_set? })
+        Some(Self { texture: Some(texture?), factor: factor?, channel: channel?, bias: bias? })
     }
 
     fn write(&self) -> TextValue {
@@ -446,7 +443,6 @@ impl<T: Factor> Value for ParamDesc<T> {
         add(self.channel == Channel::R, "channel", self.channel.write());
         add(self.factor == T::ONE, "factor", self.factor.write());
         add(self.bias == 0.0, "bias", self.bias.write());
-        add(self.uv_set == 0, "uv_set", self.uv_set.write());
         TextValue::Table(fields)
     }
 }

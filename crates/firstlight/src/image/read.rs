@@ -1,4 +1,5 @@
-//! Decoding the pictures that textures are made of: PNG and JPEG, from files that nobody vouches for.
+//! Decoding the pictures that textures are made of, from files that nobody vouches for: PNG and JPEG here, other formats
+//! in `foreign.rs`.
 //!
 //! Only the numbers of the picture count. Colour profiles and gamma chunks are ignored, as glTF demands (glTF 2.0,
 //! "Images"). So is the orientation that a camera wrote into EXIF: uv was made for the texels as they are stored, and a
@@ -20,6 +21,7 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 use super::ImageError;
 use super::contain::contained;
 use super::damage;
+use super::foreign::{Foreign, KINDS};
 
 /// How large a picture may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,7 +68,7 @@ impl Texels {
     }
 }
 
-/// Decodes a PNG or JPEG file; which of them, its first bytes say.
+/// Decodes a picture of any format that is read; which of them, its first bytes say.
 ///
 /// # Errors
 /// [`ImageError::UnknownKind`], [`ImageError::TooLarge`] before anything is decoded, and [`ImageError::Damaged`].
@@ -76,7 +78,7 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError
     } else if bytes.starts_with(JPEG) {
         contained("JPEG", || decode_jpeg(bytes, limits))
     } else {
-        Err(ImageError::UnknownKind { expected: "PNG or JPEG" })
+        Foreign::of(bytes).ok_or(ImageError::UnknownKind { expected: KINDS })?.decode(bytes, limits)
     }
 }
 
@@ -117,7 +119,7 @@ pub(crate) fn read_header(bytes: &[u8], limits: &Limits) -> Result<PictureHeader
     } else if bytes.starts_with(JPEG) {
         contained("JPEG", || jpeg_header(bytes, limits))
     } else {
-        Err(ImageError::UnknownKind { expected: "PNG or JPEG" })
+        Foreign::of(bytes).ok_or(ImageError::UnknownKind { expected: KINDS })?.header(bytes, limits)
     }
 }
 
@@ -226,7 +228,7 @@ fn decode_jpeg(bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError> {
 
 impl Samples {
     /// `None` if they do not fill the size.
-    fn fill(self, width: u32, height: u32, channels: usize) -> Option<Texels> {
+    pub(super) fn fill(self, width: u32, height: u32, channels: usize) -> Option<Texels> {
         let count = match &self {
             Samples::U8(samples) => samples.len(),
             Samples::U16(samples) => samples.len(),
@@ -362,9 +364,9 @@ mod tests {
 
     #[test]
     fn other_files_are_named_as_such() {
-        for bytes in [&b""[..], b"\x89PNG", b"GIF89a", b"RIFF....WEBP", b"\xff\xd8"] {
+        for bytes in [&b""[..], b"\x89PNG", b"RIFF....WAVE", b"\xff\xd8", b"%PDF-1.7 and more of it"] {
             let words = decode(bytes, &Limits::default()).unwrap_err().to_string();
-            assert_eq!(words, "is not a PNG or JPEG file; convert it to one");
+            assert_eq!(words, format!("is not a {KINDS} file; convert it to one"));
         }
     }
 

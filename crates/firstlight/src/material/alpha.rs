@@ -63,3 +63,20 @@ fn is_there(alpha: f32, cutoff: f32) -> f32 {
 fn bounded(alpha: f32) -> f32 {
     if alpha > 0.0 { alpha.min(1.0) } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn masks_are_there_or_not_and_blends_are_bounded() {
+        let blend = Alpha { value: Param::constant(0.5), cutoff: None };
+        assert_eq!([0.0, 0.5, 1.0].map(|vertex| blend.at_point(Vec2::ZERO, vertex, &[])), [0.0, 0.25, 0.5]);
+        let bright = Alpha { value: Param::constant(3.0), cutoff: None };
+        assert_eq!(bright.at_point(Vec2::ZERO, 1.0, &[]), 1.0);
+        assert_eq!(Alpha { value: Param::constant(f32::NAN), ..blend }.at_point(Vec2::ZERO, 1.0, &[]), 0.0);
+        // Of a mask the value is 0 or 1 already
+        let mask = Alpha { value: Param::constant(1.0), cutoff: Some(0.3) };
+        assert_eq!([0.29, 0.3, 1.0].map(|vertex| mask.at_point(Vec2::ZERO, vertex, &[])), [0.0, 1.0, 1.0]);
+    }
+}

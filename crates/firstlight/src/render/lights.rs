@@ -38,7 +38,8 @@ impl<'a> Lights<'a> {
         let scales = scene.lights.iter().map(scale).collect();
         let targets = Target::of_all(scene);
         let point_sets = emitters.iter().map(|_| LightPointSets::default()).collect();
-        let tree = (scene.lights.len() > FEW_LIGHTS)
+        // Nodes are lit or not: what veils leave of a light is known light by light
+        let tree = (scene.lights.len() > FEW_LIGHTS && !scene.has_blends())
             .then(|| LightTree::new(&scene.lights, &scene.geometry.links.classes(scene.lights.len())));
         let obstacles = emitters.iter().enumerate().map(|(index, emitter)| {
             emitter.as_ref().map_or_else(LightOccluders::default, |emitter| LightOccluders::new(scene, index, emitter))

@@ -525,7 +525,8 @@ impl Geometry {
         let mesh_trees: usize = self.all_meshes().map(|mesh| mesh.tree.bytes()).sum();
         let point_trees: usize = self.point_sets.iter().map(|points| points.tree_bytes()).sum();
         let placed = size_of_val(self.placed.as_slice()) + size_of_val(self.items.as_slice());
-        [(meshes + points) as u64, (mesh_trees + point_trees + self.upper.bytes() + placed) as u64]
+        let upper = self.upper.bytes() + self.layers.as_ref().map_or(0, |layers| layers.upper.bytes());
+        [(meshes + points) as u64, (mesh_trees + point_trees + upper + placed) as u64]
     }
 
     /// The box around something placed, in its own space; `None` if it is empty or has no end.

@@ -10,7 +10,7 @@ use super::geometry::{At, Geometry, Hit, PlacedSpot, PlacedTarget, UpperItem};
 use super::occluders::Opacity;
 use crate::accel::{TraceRay, dispatch_eight};
 use crate::ids::{MaterialId, SurfaceId};
-use crate::material::Alpha;
+use crate::material::{Alpha, Material};
 use crate::math::{DRay, DVec3, Ray};
 use crate::shape::{Mesh, RayDifferential, SurfaceInteraction, TrianglePoint};
 
@@ -56,6 +56,12 @@ impl Scene {
     #[inline(always)]
     pub(crate) fn has_layers(&self) -> bool {
         self.geometry.layers.is_some()
+    }
+
+    /// Whether anything stops a part of the light.
+    pub(crate) fn has_blends(&self) -> bool {
+        let is_blend = |material: &Material| material.common.alpha.is_some_and(|alpha| alpha.cutoff.is_none());
+        self.has_layers() && self.materials.iter().any(is_blend)
     }
 
     /// Finds the layers of a camera ray before the opaque thing at its `end`.
@@ -158,16 +164,16 @@ impl Scene {
 }
 
 /// Takes what a ray meets, one after the other.
-pub(super) type Found<'a> = &'a mut dyn FnMut(Hit);
+pub(super) type LayerSink<'a> = &'a mut dyn FnMut(Hit);
 
 impl Geometry {
     /// Calls `found` for each layer that a camera ray meets up to `limit`, in no order; each side of a shape is one.
-    fn meet_layers(&self, level: Level, ray: &Ray, limit: f32, found: Found) {
+    fn meet_layers(&self, level: Level, ray: &Ray, limit: f32, found: LayerSink) {
         dispatch_eight!(level, simd => self.meet_layers_with(simd, ray, limit, found));
     }
 
     #[inline(always)]
-    fn meet_layers_with<S: Simd>(&self, simd: S, ray: &Ray, limit: f32, found: Found) {
+    fn meet_layers_with<S: Simd>(&self, simd: S, ray: &Ray, limit: f32, found: LayerSink) {
         let Some(layers) = &self.layers else { return };
         for thing in &layers.unbounded {
             self.meet_layer_placed(simd, *thing, ray, limit, found);
@@ -199,7 +205,7 @@ impl Geometry {
     }
 
     #[inline(never)]
-    fn meet_layer_placed<S: Simd>(&self, simd: S, index: u32, ray: &Ray, limit: f32, found: Found) {
+    fn meet_layer_placed<S: Simd>(&self, simd: S, index: u32, ray: &Ray, limit: f32, found: LayerSink) {
         let thing = &self.placed[index as usize];
         if thing.camera == Opacity::Clear {
             return;

@@ -10,13 +10,14 @@ use super::advice::advise_reflectance;
 use super::compile::check_unique;
 use crate::color::Rgb;
 use crate::context::{AssetError, Assets, CompileContext};
-use crate::describe::{Channel, ColorDesc, ColorParam, NumberParam};
+use crate::describe::{Channel, ColorDesc, ColorParam, FilePath, NumberParam};
 use crate::ids::TextureId;
 use crate::image::ImageError;
 use crate::image::read::{Limits, PictureHeader, decode, read_header};
 use crate::shape::{CompileCache, key_of};
 use crate::texture::{
-    CheckerboardDesc, MaskRule, Param, Params, Pyramid, Texture, TextureDesc, TextureSpace, TextureUse,
+    CheckerboardDesc, ImageTextureDesc, MaskRule, Param, Params, Pyramid, Texture, TextureDesc, TextureSpace,
+    TextureUse,
 };
 
 /// The largest picture file read as a texture, in bytes.
@@ -96,6 +97,7 @@ impl<'a> TextureRequests<'a> {
             cx.within(&format!("texture.{}.{name}", desc.kind()), |cx| match desc {
                 TextureDesc::Checkerboard(board) => drop(board.compile(cx)),
                 TextureDesc::Image(image) => image.check(cx),
+                TextureDesc::UvGrid(grid) => grid.check(cx),
             });
         }
     }
@@ -124,7 +126,7 @@ impl<'a> TextureRequests<'a> {
     fn space(&self, index: usize, space: TextureSpace) -> TextureSpace {
         match &self.desc.textures[index].1 {
             TextureDesc::Image(image) => image.color_space.unwrap_or(space),
-            TextureDesc::Checkerboard(_) => space,
+            TextureDesc::Checkerboard(_) | TextureDesc::UvGrid(_) => space,
         }
     }
 
@@ -229,9 +231,12 @@ impl<'a> TextureRequests<'a> {
         }
         textures.file_hashes.sort_unstable();
         for (path, index) in &self.alphas {
-            let TextureDesc::Image(image) = &self.desc.textures[*index].1 else {
+            let desc = &self.desc.textures[*index].1;
+            let TextureDesc::Image(image) = desc else {
                 let hint = "use \"r\", \"g\", \"b\" or \"luminance\"";
-                cx.outside(|cx| cx.error(path, "a checkerboard has no alpha", Some(hint)));
+                cx.outside(|cx| {
+                    cx.error(path, format!("a texture of the kind {} has no alpha", desc.kind()), Some(hint))
+                });
                 continue;
             };
             let file = &image.file.0;
@@ -249,6 +254,10 @@ impl<'a> TextureRequests<'a> {
         let silent = &mut CompileContext::default();
         textures.compiled.extend(self.wanted.iter().map(|(index, of)| match &self.desc.textures[*index].1 {
             TextureDesc::Checkerboard(board) => Texture::Checkerboard(for_mask(board, *of).compile(silent)),
+            TextureDesc::UvGrid(grid) => {
+                let image = ImageTextureDesc::new(FilePath(String::new()));
+                Texture::Image(image.texture(Arc::new(Pyramid::new(&grid.picture(), *of))))
+            }
             TextureDesc::Image(image) => {
                 let picture = read[file_of[image.file.0.as_str()]].as_ref().ok().map(|file| picture_of[&file.hash]);
                 let pyramid = picture.and_then(|picture| {
@@ -289,6 +298,7 @@ impl<'a> TextureRequests<'a> {
         let used = |index: usize| self.wanted.iter().any(|(of, _)| *of == index);
         let size = |index: usize, desc: &TextureDesc| match desc {
             TextureDesc::Checkerboard(board) => Some(board.counts),
+            TextureDesc::UvGrid(grid) => Some(grid.counts),
             TextureDesc::Image(image) if used(index) => {
                 let header = &read[file_of[image.file.0.as_str()]].as_ref().ok()?.header;
                 Some([header.width, header.height])
@@ -412,8 +422,10 @@ impl Params for TextureRequests<'_> {
 
     fn normals(&mut self, cx: &mut CompileContext, field: &str, texture: &str) -> Option<TextureId> {
         let index = self.find(cx, field, texture)?;
-        if let TextureDesc::Checkerboard(_) = &self.desc.textures[index].1 {
-            cx.error(field, "a checkerboard is no normal map", Some("name a texture of the kind image"));
+        let kind = self.desc.textures[index].1.kind();
+        if !matches!(self.desc.textures[index].1, TextureDesc::Image(_)) {
+            let message = format!("a texture of the kind {kind} is no normal map");
+            cx.error(field, message, Some("name a texture of the kind image"));
             return None;
         }
         Some(self.request(index, TextureUse::Normal))

@@ -18,11 +18,11 @@ struct Veils<'a> {
     scene: &'a Scene,
     ray: &'a ShadowRay,
     /// The factors that are neither 0 nor 1.
-    factors: Vec<Factor>,
+    factors: Vec<LayerFactor>,
 }
 
 /// What one layer leaves.
-struct Factor {
+struct LayerFactor {
     hit: Hit,
     primitive: u32,
     left: f32,
@@ -101,7 +101,7 @@ impl Veils<'_> {
         let alpha = alpha.at_point(uv, vertex, &scene.textures);
         if alpha > 0.0 && alpha < 1.0 {
             let primitive = geometry.primitive(&hit).unwrap_or(0);
-            factors.push(Factor { hit, primitive, left: 1.0 - alpha });
+            factors.push(LayerFactor { hit, primitive, left: 1.0 - alpha });
         }
         alpha >= 1.0
     }
@@ -109,7 +109,7 @@ impl Veils<'_> {
     /// The product of all factors.
     fn product(mut self) -> f32 {
         let geometry = &*self.scene.geometry;
-        let place = |one: &Factor| (one.hit.surface, one.primitive);
+        let place = |one: &LayerFactor| (one.hit.surface, one.primitive);
         self.factors.sort_by(|a, b| place(a).cmp(&place(b)).then_with(|| a.hit.t.total_cmp(&b.hit.t)));
         let mut product = 1.0;
         for (k, factor) in self.factors.iter().enumerate() {

@@ -2,12 +2,16 @@
 
 mod checkerboard;
 mod filter;
+#[cfg(test)]
+mod filter_tests;
 mod image;
 mod pyramid;
 mod texels;
+mod uv_grid;
 
 pub use checkerboard::{Checkerboard, CheckerboardDesc};
 pub use image::{Filter, ImageTexture, ImageTextureDesc, TextureSpace, Wrap};
+pub use uv_grid::UvGridDesc;
 
 pub(crate) use pyramid::{MaskRule, Pyramid, TextureUse};
 
@@ -25,6 +29,8 @@ family! {
         Checkerboard(CheckerboardDesc) = "checkerboard",
         /// `[texture.image.NAME]`
         Image(ImageTextureDesc) = "image",
+        /// `[texture.uv-grid.NAME]`
+        UvGrid(UvGridDesc) = "uv-grid",
     }
 }
 
@@ -33,7 +39,7 @@ family! {
 pub enum Texture {
     /// `[texture.checkerboard.NAME]`
     Checkerboard(Checkerboard),
-    /// `[texture.image.NAME]`
+    /// `[texture.image.NAME]`, and the picture of a `[texture.uv-grid.NAME]`
     Image(ImageTexture),
 }
 
