@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::color::Rgb;
 use crate::image::{Buffer, LightPart, Plane};
-use crate::material::{Bsdf, Colors, MOMENTS};
+use crate::material::{Bsdf, LightTerm, PARTS};
 use crate::scene::Scene;
 
 /// A term of a pixel's colour: a mean over its rays.
@@ -69,10 +69,8 @@ impl Emission {
     }
 }
 
-/// The reflected light of one light, summed over the rays of a pixel, without the light's scale: diffuse and specular.
-pub(crate) type LightTerm = Colors;
-
-/// The same with the light and its scale; `None` is all lights that a cut takes together.
+/// The reflected light of one light, summed over the rays of a pixel, and the light's scale, which is not in it; `None`
+/// is all lights that a cut takes together.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScaledTerm {
     pub light: Option<u32>,
@@ -99,8 +97,8 @@ impl PixelTerms {
         let rays = (scene.antialiasing * scene.antialiasing) as f32;
         for ScaledTerm { light, scale, term } in lights {
             let Some(light) = *light else { continue };
-            for (moment, part) in term.0.into_iter().enumerate() {
-                sums.keep(at, Term::Apart(light, moment), *scale, std::iter::once(part * (1.0 / rays)));
+            for (part, value) in term.0.into_iter().enumerate() {
+                sums.keep(at, Term::Apart(light, part), *scale, std::iter::once(value * (1.0 / rays)));
             }
         }
     }
@@ -118,8 +116,8 @@ impl PixelTerms {
         add(Term::Emission, Rgb::WHITE, self.emission.mean(scene.antialiasing * scene.antialiasing));
         add(Term::Ambient, Rgb::WHITE, mean(self.ambient));
         for ScaledTerm { light, scale, term } in lights {
-            for (moment, part) in term.0.into_iter().enumerate() {
-                add(Term::Light(light, moment), scale, mean(part));
+            for (part, value) in term.0.into_iter().enumerate() {
+                add(Term::Light(light, part), scale, mean(value));
             }
         }
     }
@@ -133,8 +131,8 @@ impl Term {
             Term::Background => 0,
             Term::Emission => 1,
             Term::Ambient => 2,
-            Term::Light(light, moment) => 3 + light.map_or(0, |light| light as usize + 1) * MOMENTS + moment,
-            Term::Apart(light, moment) => 3 + (1 + lights + light as usize) * MOMENTS + moment,
+            Term::Light(light, part) => 3 + light.map_or(0, |light| light as usize + 1) * PARTS + part,
+            Term::Apart(light, part) => 3 + (1 + lights + light as usize) * PARTS + part,
         }
     }
 
@@ -151,7 +149,7 @@ impl Term {
             Buffer::Light(_, part) | Buffer::Group(_, part) => {
                 let moments = match part.and_then(LightPart::moment) {
                     Some(moment) => moment..moment + 1,
-                    None => 0..MOMENTS,
+                    None => 0..PARTS,
                 };
                 let lights = scene.lights_of(buffer);
                 let terms = |light| {

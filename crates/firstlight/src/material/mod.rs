@@ -16,7 +16,7 @@ pub use classic::Classic;
 pub use common::{MaterialCommon, MaterialCommonDesc};
 pub(crate) use highlight::Highlight;
 pub(crate) use lobe_lanes::LobeLanes;
-pub(crate) use moments::{Colors, MOMENTS, Moments, PerMoment};
+pub(crate) use moments::{Colors, LightTerm, MOMENTS, Moments, PARTS, PerMoment};
 pub use phong::{PhongDesc, PhongLobe};
 pub(crate) use shading_point::ShadingPoint;
 

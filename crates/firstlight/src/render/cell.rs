@@ -32,12 +32,12 @@ use super::visible_shape::{MeanBsdf, VisibleShape};
 use crate::color::Rgb;
 use crate::film::FilmTile;
 use crate::film::hits::{PixelHits, PixelRays};
-use crate::film::resolve::{LightTerm, PixelTerms, ScaledTerm, Term, TermSums};
+use crate::film::resolve::{PixelTerms, ScaledTerm, Term, TermSums};
 use crate::film::tile::Tile;
 use crate::film::{AaMode, Heat};
 use crate::image::Buffer;
 use crate::integrate::TOLERANCE;
-use crate::material::{Bsdf, Colors, MOMENTS, Moments};
+use crate::material::{Bsdf, Colors, LightTerm, Moments, PARTS};
 use crate::math::Ray;
 use crate::scene::Scene;
 use crate::visibility::Visibility;
@@ -305,7 +305,9 @@ impl<'a> CellRenderer<'a> {
             let block = block.filter(|_| mean.is_constant);
             for light in 0..lights {
                 match block.and_then(|block| self.grid.arriving(&block, light as usize, at)) {
-                    Some(moments) => *self.term(fragment as u32, light) += mean.bsdf.colors.each(&(moments * count)),
+                    Some(moments) => {
+                        *self.term(fragment as u32, light) += mean.bsdf.colors.reflected(&(moments * count))
+                    }
                     None => {
                         self.queues[ShadingRate::Quadrant as usize].push(FragmentQuery::new(fragment as u32, light));
                     }
@@ -327,9 +329,9 @@ impl<'a> CellRenderer<'a> {
         for light in 0..self.few {
             let scale = self.lights.scale(light);
             let row = self.grid.row(block, light, at, pixels);
-            for moment in 0..MOMENTS {
-                let part = |arriving: &Moments| bsdf.colors.each(arriving).0[moment];
-                self.sums.add(first, Term::Light(Some(light as u32), moment), scale, row.iter().map(part));
+            for part in 0..PARTS {
+                let value = |arriving: &Moments| bsdf.colors.reflected(arriving).0[part];
+                self.sums.add(first, Term::Light(Some(light as u32), part), scale, row.iter().map(value));
             }
         }
     }
@@ -383,7 +385,7 @@ impl<'a> CellRenderer<'a> {
                 for (point, estimate) in of.range(rate).zip(own) {
                     let rays = self.fragments.part(rate, point).0 as f32;
                     let colors = self.fragments.points_of(rate)[point].bsdf.colors;
-                    sum += colors.each(&(estimate.moments * rays));
+                    sum += colors.reflected(&(estimate.moments * rays));
                 }
                 *self.term(fragment, light) += sum;
                 continue;
@@ -515,7 +517,7 @@ impl<'a> CellRenderer<'a> {
                 let mut pooled = None;
                 for (point, estimate) in self.fragments.rays[rays.clone()].iter().zip(own) {
                     if estimate.moments.is_known() {
-                        sum += point.bsdf.colors.each(&estimate.moments);
+                        sum += point.bsdf.colors.reflected(&estimate.moments);
                         continue;
                     }
                     let (salt, light) = (salt(self.at(pixel), surface), *light as usize);

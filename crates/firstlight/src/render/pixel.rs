@@ -5,9 +5,9 @@ use std::ops::ControlFlow;
 
 use super::{Counts, QUESTION_EVERY};
 use crate::film::hits::camera_ray;
-use crate::film::resolve::{LightTerm, PixelTerms, ScaledTerm, TermSums};
+use crate::film::resolve::{PixelTerms, ScaledTerm, TermSums};
 use crate::ids::LightId;
-use crate::material::{Bsdf, MOMENTS, Moments, PerMoment, ShadingPoint};
+use crate::material::{Bsdf, LightTerm, MOMENTS, Moments, PerMoment, ShadingPoint};
 use crate::math::{LaneSum, Ray};
 use crate::scene::{Hit, Scene, TracedHit};
 
@@ -97,7 +97,7 @@ impl PixelSum {
     /// Adds the moments of light `index` at a surface: the totals of [`LobeSums`].
     #[inline(always)]
     pub fn light(&mut self, index: usize, bsdf: &Bsdf, moments: &Moments) {
-        self.lights[index] += bsdf.colors.each(moments);
+        self.lights[index] += bsdf.colors.reflected(moments);
     }
 
     /// Adds all lights at a shading point.

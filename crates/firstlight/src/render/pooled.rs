@@ -18,11 +18,10 @@ use variance::VarianceEstimate;
 use super::Counts;
 use super::direct::DirectLighting;
 use crate::color::Rgb;
-use crate::film::resolve::LightTerm;
 use crate::ids::SurfaceId;
 use crate::integrate::TOLERANCE;
 use crate::light::{SERIES, mix};
-use crate::material::{MOMENTS, Moments, ShadingPoint};
+use crate::material::{LightTerm, MOMENTS, Moments, ShadingPoint};
 use crate::visibility::{ShadowView, Visibility};
 
 /// So many samples of all rays prove that all of the light is hidden: the display curve is steepest at black.
@@ -150,7 +149,7 @@ impl PooledVisibility {
     }
 
     fn receive(&mut self, point: &ShadingPoint, moments: &Moments, visible_fraction: Option<f32>) {
-        self.sum.terms += point.bsdf.colors.each(moments);
+        self.sum.terms += point.bsdf.colors.reflected(moments);
         self.sum.moments += *moments;
         self.value += (self.scale * point.bsdf.colors).of(moments);
         if let Some(visible) = visible_fraction {

@@ -328,7 +328,7 @@ impl CellRenderer<'_> {
                     continue;
                 }
             }
-            let terms = mean.bsdf.colors.each(&(moments * *count as f32));
+            let terms = mean.bsdf.colors.reflected(&(moments * *count as f32));
             self.note(fragment, light, FragmentLight::Summed(terms));
         }
         true

@@ -5,9 +5,9 @@ use std::iter;
 
 use super::{CellRenderer, Pixel, PixelState};
 use crate::film::hits::camera_ray;
-use crate::film::resolve::{LightTerm, PixelTerms};
+use crate::film::resolve::PixelTerms;
 use crate::film::tile::Tile;
-use crate::material::ShadingPoint;
+use crate::material::{LightTerm, ShadingPoint};
 use crate::math::Ray;
 use crate::render::fragment::RayPoint;
 use crate::render::lighting_grid::SurfaceBlock;
