@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::color::Rgb;
 use crate::image::{Buffer, LightPart, Plane};
-use crate::material::{Bsdf, LightTerm, PARTS};
+use crate::material::{LightTerm, PARTS};
 use crate::scene::Scene;
 
 /// A term of a pixel's colour: a mean over its rays.
@@ -46,17 +46,17 @@ struct KeptSum {
 pub(crate) struct PixelTerms {
     /// The number of rays without a hit.
     pub background: u32,
-    /// The emission of visible lights.
+    /// The emission of visible lights and of surfaces.
     pub emission: Emission,
     pub ambient: Rgb,
 }
 
-/// The sum of the emission of visible lights over rays. In 64 bits, so that it does not depend on the order.
+/// The sum of emission over rays. In 64 bits, so that it does not depend on the order.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Emission([f64; 3]);
 
 impl Emission {
-    /// Adds the radiance of a light that `rays` rays meet.
+    /// Adds the radiance of what `rays` rays meet.
     pub fn add(&mut self, radiance: Rgb, rays: u32) {
         for (sum, radiance) in self.0.iter_mut().zip(radiance.to_array()) {
             *sum += f64::from(radiance) * f64::from(rays);
@@ -86,12 +86,6 @@ impl ScaledTerm {
 }
 
 impl PixelTerms {
-    /// Adds what a surface emits, and its answer to ambient light, that `rays` rays see.
-    pub fn see(&mut self, scene: &Scene, bsdf: &Bsdf, rays: u32) {
-        self.emission.add(bsdf.emission, rays);
-        self.ambient += bsdf.ambient_light(scene.ambient) * rays as f32;
-    }
-
     /// Adds the terms of single lights, which are no terms of the colour, to the sums of pixel `at` for buffers.
     pub fn keep_apart(scene: &Scene, lights: &[ScaledTerm], at: usize, sums: &mut TermSums) {
         let rays = (scene.antialiasing * scene.antialiasing) as f32;

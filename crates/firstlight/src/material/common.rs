@@ -4,8 +4,7 @@ use crate::color::Rgb;
 use crate::context::CompileContext;
 use crate::describe::{ColorParam, table};
 use crate::ids::TextureId;
-use crate::shape::SurfaceInteraction;
-use crate::texture::{Param, Params, Texture};
+use crate::texture::{Param, Params};
 
 /// The largest factor of `emissive`.
 const MAX_EMISSION: f64 = 1e6;
@@ -29,7 +28,7 @@ pub struct MaterialCommon {
 
 impl MaterialCommonDesc {
     pub(super) fn compile(&self, cx: &mut CompileContext, params: &mut impl Params) -> MaterialCommon {
-        let mut emissive = params.color(cx, "emissive", &self.emissive);
+        let mut emissive = params.radiance(cx, "emissive", &self.emissive);
         cx.between("emissive_strength", self.emissive_strength, 0.0, MAX_EMISSION, None);
         emissive.factor = emissive.factor * self.emissive_strength as f32;
         MaterialCommon { emissive }
@@ -39,12 +38,6 @@ impl MaterialCommonDesc {
 impl MaterialCommon {
     /// That of materials that say nothing of it.
     pub(super) const NONE: MaterialCommon = MaterialCommon { emissive: Param { texture: None, factor: Rgb::BLACK } };
-
-    /// The radiance that it emits at a surface.
-    #[inline]
-    pub(super) fn emission(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Rgb {
-        self.emissive.color(si, textures)
-    }
 
     /// The textures of its parameters.
     pub(super) fn textures(&self) -> [Option<TextureId>; 1] {

@@ -5,8 +5,8 @@ use std::ops::{Add, AddAssign, Mul};
 
 use crate::color::Rgb;
 
-/// How many there are: the cosine, and the highlight.
-pub(crate) const MOMENTS: usize = 2;
+/// How many there are, at most: the cosine, or what of it is transmitted, and the parts of the highlight.
+pub(crate) const MOMENTS: usize = 3;
 
 /// Something of each moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -57,7 +57,7 @@ impl<T: Copy> PerMoment<T> {
     /// Bounds: of what is as wide as the cosine, and of highlights.
     #[inline(always)]
     pub fn bounds(wide: T, narrow: T) -> Self {
-        PerMoment([wide, narrow])
+        PerMoment([wide, narrow, narrow])
     }
 
     /// The cosine's.

@@ -321,10 +321,7 @@ impl<'a> CellRenderer<'a> {
     fn sum_row(&mut self, block: &SurfaceBlock, at: [u32; 2], pixels: usize, bsdf: &Bsdf) {
         let first = self.index(at);
         self.sums.begin(first..first + pixels, Rgb::BLACK, 1.0);
-        if bsdf.emission != Rgb::BLACK {
-            self.sums.add(first, Term::Emission, Rgb::WHITE, iter::repeat_n(bsdf.emission, pixels));
-        }
-        let ambient = iter::repeat_n(bsdf.ambient_light(self.scene.ambient), pixels);
+        let ambient = iter::repeat_n(bsdf.base(&self.scene.ambient), pixels);
         self.sums.add(first, Term::Ambient, Rgb::WHITE, ambient);
         for light in 0..self.few {
             let scale = self.lights.scale(light);
@@ -446,8 +443,8 @@ impl<'a> CellRenderer<'a> {
         let bend = part * estimate.most;
         let bsdf = &fragment.mean.bsdf;
         let colors = self.lights.scale(light as usize) * bsdf.colors;
-        let value = colors.onto(bsdf.base(self.scene.ambient), &estimate.moments);
-        self.lights.steps(value, colors.of(&Moments::bounds(bend, bend)))
+        let value = colors.onto(bsdf.base(&self.scene.ambient), &estimate.moments);
+        self.lights.steps(value, colors.of(&Moments::bounds(bend, bend * bsdf.lobe.most())))
     }
 
     /// Whether a light varies little enough over the quadrants of a fragment.
@@ -474,7 +471,7 @@ impl<'a> CellRenderer<'a> {
         let bsdf = &fragment.mean.bsdf;
         let scale = self.lights.scale(light as usize);
         let colors = scale * bsdf.colors;
-        let value = colors.onto(bsdf.base(self.scene.ambient), &most);
+        let value = colors.onto(bsdf.base(&self.scene.ambient), &most);
         let sets_in = estimates.iter().any(|estimate| estimate.moments == Moments::ZERO);
         let allowed = if sets_in { TOLERANCE.spread * TOLERANCE.bends_at_once } else { TOLERANCE.spread };
         let weight = fragment.share * (self.few as f32).sqrt();
@@ -554,7 +551,7 @@ impl<'a> CellRenderer<'a> {
     fn add_ambient(&mut self) {
         for Fragment { pixel, mean, count, .. } in &self.fragments.all {
             let pixel = &mut self.pixels[*pixel as usize];
-            pixel.terms.see(self.scene, &mean.bsdf, *count);
+            pixel.terms.ambient += mean.bsdf.base(&self.scene.ambient) * *count as f32;
         }
     }
 

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::visible_shape::{MeanBsdf, VisibleShape};
 use crate::ids::SurfaceId;
 use crate::integrate::TOLERANCE;
-use crate::material::{Bsdf, Colors, Material, ShadingPoint};
+use crate::material::{Bsdf, Colors, ShadingPoint};
 use crate::math::{DVec3, Ray, Vec3};
 use crate::scene::Scene;
 
@@ -82,7 +82,7 @@ impl Fragment {
 impl Fragments {
     pub fn new(scene: &Scene, by_means: bool) -> Self {
         Fragments {
-            plain: scene.materials.iter().map(Material::plain_bsdf).collect(),
+            plain: scene.materials.iter().map(|material| material.plain_bsdf(&scene.ambient)).collect(),
             by_means,
             all: Vec::new(),
             rays: Vec::new(),
@@ -343,7 +343,7 @@ fn center_in_trees<'a>(
     let (ray, differential) = scene.camera.local_ray(mean(i, x), mean(j, y), 1.0 / n as f32);
     let hit = scene.intersect_local(&ray).filter(|hit| hit.surface == first.surface)?;
     let si = scene.local_surface(&ray, &hit, &differential);
-    let mut center = ShadingPoint::of(&si, bsdf, scene.ambient);
+    let mut center = ShadingPoint::of(&si, bsdf, &scene.ambient);
     if !is_one_surface(&center, first) {
         return None;
     }

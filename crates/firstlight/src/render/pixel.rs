@@ -85,9 +85,10 @@ impl PixelSum {
             TracedHit::Emission(radiance) => self.terms.emission.add(radiance, 1),
             TracedHit::Surface(si) => {
                 // Evaluate the textures of the material
-                let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
-                let point = ShadingPoint::of(&si, &bsdf, scene.ambient);
-                self.terms.see(scene, &bsdf, 1);
+                let bsdf = scene.bsdf(&si);
+                let point = ShadingPoint::of(&si, &bsdf, &scene.ambient);
+                self.terms.ambient += point.base;
+                self.terms.emission.add(scene.emission(&si), 1);
                 return Some(point);
             }
         }

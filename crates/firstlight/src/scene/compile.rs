@@ -24,7 +24,7 @@ use crate::ids::TextureId;
 use crate::image::ImageError;
 use crate::image::read::{Limits, TexelData, Texels, decode};
 use crate::light::{Light, LightDesc, check_samples};
-use crate::material::Material;
+use crate::material::{Ambient, Material};
 use crate::math::DVec3;
 use crate::shape::{CompileCache, MeshFiles, ShapeDesc, key_of};
 use crate::texture::{CheckerboardDesc, Param, Params, Texture, TextureDesc, TextureSpace};
@@ -240,7 +240,7 @@ impl SceneDesc {
                 antialiasing,
                 tolerance,
                 background: cx.color("background", render.background),
-                ambient: cx.color("ambient", render.ambient),
+                ambient: render.ambient.compile(cx),
                 display: Display { encoding, exposure },
             }
         })
@@ -414,7 +414,7 @@ struct Picture {
     antialiasing: u32,
     tolerance: f64,
     background: Rgb,
-    ambient: Rgb,
+    ambient: Ambient,
     display: Display,
 }
 
@@ -617,11 +617,14 @@ impl<'a> Textures<'a> {
 }
 
 impl Params for Textures<'_> {
-    fn color(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb> {
-        let path = factor_path(field, &param.texture);
-        let factor = cx.color(&path, param.factor);
-        advise_reflectance(cx, &path, param.factor.linear);
+    fn radiance(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb> {
+        let factor = cx.color(&factor_path(field, &param.texture), param.factor);
         Param { texture: self.resolve(cx, field, &param.texture, TextureSpace::Srgb), factor }
+    }
+
+    fn color(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb> {
+        advise_reflectance(cx, &factor_path(field, &param.texture), param.factor.linear);
+        self.radiance(cx, field, param)
     }
 
     fn number(&mut self, cx: &mut CompileContext, field: &str, param: &NumberParam, range: [f64; 2]) -> Param<f32> {

@@ -60,6 +60,9 @@ impl Texture {
 
 /// Where the parameters of materials come from: numbers, and textures by name.
 pub(crate) trait Params {
+    /// A radiance: 0 or more in each channel.
+    fn radiance(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb>;
+    /// A reflectance: the same, and advice where it is more than 1.
     fn color(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb>;
     fn number(&mut self, cx: &mut CompileContext, field: &str, param: &NumberParam, range: [f64; 2]) -> Param<f32>;
 }

@@ -358,7 +358,7 @@ impl CellRenderer<'_> {
         };
         let scale = self.lights.scale(light);
         let others = self.others(fragment, light, counts);
-        let value: Rgb = bsdf.base(self.scene.ambient) + others + scale * bsdf.colors.of(moments);
+        let value: Rgb = bsdf.base(&self.scene.ambient) + others + scale * bsdf.colors.of(moments);
         self.lights.steps(value, scale * bsdf.colors.of(error))
     }
 }

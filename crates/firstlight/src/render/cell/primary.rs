@@ -132,14 +132,17 @@ impl CellRenderer<'_> {
             }
             let point = match shape {
                 Some(shape) => {
-                    let plain = self.fragments.plain_bsdf(scene, shape);
-                    let bsdf = plain.unwrap_or_else(|| shape.bsdf(scene, ray, hit.t, &differential()));
+                    let bsdf = self.fragments.plain_bsdf(scene, shape).unwrap_or_else(|| {
+                        let si = shape.interaction(scene, ray, hit.t, &differential());
+                        pixel.terms.emission.add(scene.emission(&si), 1);
+                        scene.bsdf(&si)
+                    });
                     shape.point(scene, ray, hit.t, &bsdf)
                 }
                 None => {
                     let si = scene.local_surface(ray, &hit, &differential());
-                    let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
-                    ShadingPoint::of(&si, &bsdf, scene.ambient)
+                    pixel.terms.emission.add(scene.emission(&si), 1);
+                    ShadingPoint::of(&si, &scene.bsdf(&si), &scene.ambient)
                 }
             };
             points.push(RayPoint { shape, point, at });
@@ -192,7 +195,6 @@ impl CellRenderer<'_> {
             all.lobe = all.lobe.with(bsdf.lobe).unwrap_or(all.lobe);
             all.colors = all.colors.max(bsdf.colors);
             all.ambient = all.ambient.min(bsdf.ambient);
-            all.emission = all.emission.min(bsdf.emission);
             let number = means.unwrap_or_default() + square.number(at);
             self.means[number] = Some(mean);
             let index = self.index(at);
