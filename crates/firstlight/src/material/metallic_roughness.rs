@@ -8,16 +8,17 @@ use crate::ids::TextureId;
 use crate::texture::{Param, Params};
 
 table! {
-    /// Metallic-roughness: a dielectric of `base_color` under a clear interface, or a metal of `base_color`, or a mix, with a
-    /// highlight of microfacets.
+    /// Metallic-roughness: a dielectric of `base_color` under a clear interface, or a metal of `base_color`, or a mix,
+    /// with a highlight of microfacets.
     ///
     /// f = pi x (n.wi) x mix(dielectric, metal, `metallic`); with h = normalize(wi + wo) and w = (1 - wo.h)^5,
     /// dielectric = base_color / pi (1 - max F) + V D F, F = f0 + (f90 - f0) w, f0 = min(((ior - 1) / (ior + 1))^2
-    /// specular_color, 1) specular, f90 = specular; metal = V D (base_color + (1 - base_color) w). D is the distribution
-    /// of Trowbridge and Reitz (GGX) with alpha = roughness^2, at least 0.003, and V Smith's height-correlated masking.
+    /// specular_color, 1) specular, f90 = specular; metal = V D (base_color + (1 - base_color) w). D is the
+    /// distribution of Trowbridge and Reitz (GGX) with alpha = roughness^2, at least 0.003, and V Smith's
+    /// height-correlated masking.
     ///
-    /// Sources: "glTF 2.0 specification", appendix B; its extensions KHR_materials_ior and KHR_materials_specular. As there,
-    /// rough dielectrics may reflect more light than arrives, at grazing angles.
+    /// Sources: "glTF 2.0 specification", appendix B; its extensions KHR_materials_ior and KHR_materials_specular. As
+    /// there, rough dielectrics may reflect more light than arrives, at grazing angles.
     ///
     /// ```toml
     /// [material.metallic-roughness.gold]

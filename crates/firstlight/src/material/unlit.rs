@@ -7,7 +7,8 @@ use crate::describe::{ColorParam, table};
 use crate::texture::Params;
 
 table! {
-    /// Unlit: the surface is seen in its colour, whatever light there is. It reflects nothing, and blocks light as all do.
+    /// Unlit: the surface is seen in its colour, whatever light there is. It reflects nothing, and blocks light as all
+    /// do.
     ///
     /// Source: the extension KHR_materials_unlit of glTF 2.0.
     ///
