@@ -158,7 +158,17 @@ fn read_text(
     let assets = Remembered::new(folder.map(|folder| folder_assets(folder, reading)).transpose()?);
     let parsed = SceneDesc::parse(&name, text, &assets);
     let (folder, framing) = (folder.map(Path::to_path_buf), Framing::default());
-    Ok(Input { name, parsed, is_model: false, own, folder, framing, assets, strict: reading.strict, texture_memory: reading.texture_memory })
+    Ok(Input {
+        name,
+        parsed,
+        is_model: false,
+        own,
+        folder,
+        framing,
+        assets,
+        strict: reading.strict,
+        texture_memory: reading.texture_memory,
+    })
 }
 
 /// The files of a folder, and of those that are allowed besides.

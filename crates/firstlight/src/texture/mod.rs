@@ -2,9 +2,9 @@
 
 mod checkerboard;
 mod filter;
-mod image;
 #[cfg(test)]
 mod filter_tests;
+mod image;
 mod pyramid;
 mod texels;
 mod uv_grid;
