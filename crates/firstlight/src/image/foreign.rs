@@ -1,7 +1,7 @@
 //! Pictures for textures in the formats that the `image` crate reads, and in HDR and EXR.
 //!
-//! TexelSamples stay as they are stored: no profile, no gamma, no orientation is applied. Of an animation the first picture
-//! is taken. HDR and EXR are linear; what is negative or no number is 0.
+//! TexelSamples stay as they are stored: no profile, no gamma, no orientation is applied. Of an animation the first
+//! picture is taken. HDR and EXR are linear; what is negative or no number is 0.
 
 use std::io::Cursor;
 
