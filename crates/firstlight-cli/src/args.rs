@@ -162,6 +162,10 @@ pub struct ReadingArgs {
     /// none]
     #[arg(long = "allow-dir", value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub allow_dir: Vec<PathBuf>,
+    /// Lets the pictures of textures take up to MIB mebibytes, with their smaller copies; more is an error [default:
+    /// 2048]
+    #[arg(long = "texture-memory", value_name = "MIB")]
+    pub texture_memory: Option<u32>,
     /// Makes the normals of a model smooth where its faces meet at less than DEGREES, 0 to 180 [default: its own
     /// normals; flat if it has none]
     #[arg(long, value_name = "DEGREES", value_parser = angle, help_heading = "Models (.ply, .stl, .obj)")]

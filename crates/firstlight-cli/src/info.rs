@@ -42,10 +42,11 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
 /// # Errors
 /// One is.
 fn refuse_options_of_scenes(args: &InfoArgs) -> Result<(), Failure> {
-    let ReadingArgs { strict, allow_dir, smooth, up } = &args.scene.reading;
+    let ReadingArgs { strict, allow_dir, texture_memory, smooth, up } = &args.scene.reading;
     let said = [
         ("--strict", *strict),
         ("--allow-dir", !allow_dir.is_empty()),
+        ("--texture-memory", texture_memory.is_some()),
         ("--smooth", smooth.is_some()),
         ("--up", up.is_some()),
         ("--time", args.time.is_some()),

@@ -41,6 +41,7 @@ pub struct Input {
     pub framing: Framing,
     assets: Remembered,
     strict: bool,
+    texture_memory: Option<u32>,
 }
 
 /// The files of a scene, kept once they were read.
@@ -157,7 +158,17 @@ fn read_text(
     let assets = Remembered::new(folder.map(|folder| folder_assets(folder, reading)).transpose()?);
     let parsed = SceneDesc::parse(&name, text, &assets);
     let (folder, framing) = (folder.map(Path::to_path_buf), Framing::default());
-    Ok(Input { name, parsed, is_model: false, own, folder, framing, assets, strict: reading.strict })
+    Ok(Input {
+        name,
+        parsed,
+        is_model: false,
+        own,
+        folder,
+        framing,
+        assets,
+        strict: reading.strict,
+        texture_memory: reading.texture_memory,
+    })
 }
 
 /// The files of a folder, and of those that are allowed besides.
@@ -212,6 +223,7 @@ fn read_model(path: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
         own: Some(path.to_path_buf()),
         assets: Remembered { model: Some((called, file)), ..assets },
         strict: reading.strict,
+        texture_memory: reading.texture_memory,
     })
 }
 
@@ -232,6 +244,7 @@ fn piped_model(name: &str, own: Option<PathBuf>, bytes: Vec<u8>, reading: &Readi
         own,
         assets,
         strict: reading.strict,
+        texture_memory: reading.texture_memory,
     }
 }
 
@@ -317,6 +330,7 @@ impl Input {
             light: self.is_model,
             progress,
             cache: None,
+            texture_memory: self.texture_memory.map(|mib| u64::from(mib) << 20),
         };
         self.parsed.compile(&self.assets, &options).map_err(|e| Failure::Scene(e.faults))
     }

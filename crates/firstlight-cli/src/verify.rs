@@ -105,6 +105,7 @@ fn open(path: &Path, said: &ReceiptSettings, args: &VerifyArgs) -> Result<(Input
     let reading = ReadingArgs {
         strict: false,
         allow_dir: args.allow_dir.clone(),
+        texture_memory: None,
         smooth: model.and_then(|model| model.smooth_deg),
         up: model.map(|model| if model.up == UpAxis::Z { Axis::Z } else { Axis::Y }),
     };

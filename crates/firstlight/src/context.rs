@@ -349,6 +349,11 @@ impl CompileContext {
         Diagnostic { severity, place: None, path, message, hint: hint.map(str::to_owned) }
     }
 
+    /// The whole path of `field`, for a fault that is found later.
+    pub(crate) fn path_of(&self, field: &str) -> String {
+        if self.path.is_empty() { field.to_owned() } else { format!("{}.{field}", self.path) }
+    }
+
     /// What may surprise, in the order found.
     pub(crate) fn take_advice(&mut self) -> Vec<Diagnostic> {
         std::mem::take(&mut self.advice)

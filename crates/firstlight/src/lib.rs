@@ -81,7 +81,7 @@ pub use camera::{Camera, CameraDesc, FilmPlane, Frame, Orthographic, Pinhole, Pr
 pub use color::{Display, Encoding, Rgb};
 pub use context::{AssetError, Assets, CompileStage, FolderAssets, MemoryAssets, NoAssets, OnCompile};
 pub use describe::nearest_name;
-pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, SamplesDesc, ScaleDesc};
+pub use describe::{Channel, ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, SamplesDesc, ScaleDesc};
 pub use error::{Diagnostic, Place, SceneError, Severity, printable};
 pub use film::{
     AaMode, Coco, Film, Heat, LightChange, Mask, ObjectMasks, ReceiptFault, ReceiptSettings, RelightError, Relit,
@@ -109,13 +109,13 @@ pub use scene::{
     Added, CameraHit, CastHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, ModelSettings, MotionTo,
     RenderDesc, Scene, SceneDesc, SceneSummary, SurfacePoint, UpAxis, View,
 };
-pub use scene::{Builtin, Parsed, builtin_scenes, reference, schema};
+pub use scene::{Builtin, Parsed, TEXTURE_MEMORY, builtin_scenes, reference, schema};
 pub use shape::{
     BoxDesc, CompileCache, ConeDesc, CylinderDesc, DiskDesc, Footprint, GroupDesc, InstanceDesc, MeshDesc,
     ParallelogramDesc, PlaneDesc, PointSetDesc, RayDifferential, RectangleShapeDesc, ShadowTerminator, ShapeDesc,
     SphereDesc, SphereUv, TorusDesc, UvEdge,
 };
-pub use texture::{CheckerboardDesc, Filter, ImageTextureDesc, TextureDesc, TextureSpace, Wrap};
+pub use texture::{CheckerboardDesc, Filter, ImageTextureDesc, TextureDesc, TextureSpace, UvGridDesc, Wrap};
 pub use transform::{Interpolation, TransformDesc, TransformKeyDesc};
 
 /// The code of the book and of the README is compiled, and run where that takes no files.

@@ -72,11 +72,17 @@ fn color() -> impl Strategy<Value = ColorDesc> {
 }
 
 fn color_param() -> impl Strategy<Value = ColorParam> {
-    (proptest::option::of(text()), color()).prop_map(|(texture, factor)| ColorParam { texture, factor })
+    (proptest::option::of(text()), color())
+        .prop_map(|(texture, factor)| ColorParam { texture, ..ColorParam::constant(factor) })
 }
 
 fn number_param() -> impl Strategy<Value = NumberParam> {
-    (proptest::option::of(text()), number()).prop_map(|(texture, factor)| NumberParam { texture, factor })
+    (proptest::option::of(text()), number(), select(Channel::ALL), number()).prop_map(
+        |(texture, factor, channel, bias)| match texture {
+            Some(_) => NumberParam { texture, factor, channel, bias },
+            None => NumberParam::constant(factor),
+        },
+    )
 }
 
 fn maybe<T: std::fmt::Debug + Clone>(strategy: impl Strategy<Value = T>) -> impl Strategy<Value = Option<T>> {
@@ -367,11 +373,12 @@ fn texture() -> impl Strategy<Value = TextureDesc> {
         color(),
         [[number(), number()], [number(), number()]],
     )
-        .prop_map(|(file, wrap, filter, space, border, [scale, offset])| {
-            let new = ImageTextureDesc::new(file.into());
-            TextureDesc::Image(ImageTextureDesc { wrap, filter, space, border, scale, offset, ..new })
+        .prop_map(|(file, wrap, filter, color_space, border, [scale, offset])| {
+            let new = ImageTextureDesc { rotate_deg: scale[1], ..ImageTextureDesc::new(file.into()) };
+            TextureDesc::Image(ImageTextureDesc { wrap, filter, color_space, border, scale, offset, ..new })
         });
-    prop_oneof![checkerboard, image]
+    let grid = any::<[u32; 2]>().prop_map(|counts| TextureDesc::UvGrid(UvGridDesc { counts }));
+    prop_oneof![checkerboard, image, grid]
 }
 
 prop_compose! {

@@ -255,5 +255,5 @@ pub(crate) use family::{Family, TableInfo, family};
 pub(crate) use info::{Choice, FieldInfo};
 pub use read::nearest_name;
 pub(crate) use read::{Fields, Table, Value, Words, nearest};
-pub use value::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, SamplesDesc, ScaleDesc};
+pub use value::{Channel, ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, SamplesDesc, ScaleDesc};
 pub(crate) use write::TextValue;

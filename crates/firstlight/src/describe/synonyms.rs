@@ -42,6 +42,7 @@ pub(crate) const SYNONYMS: &[(&[&str], &str, &str)] = &[
     // Kinds of textures
     (&["checker", "checkers", "chess", "chessboard"], "checkerboard", ""),
     (&["bitmap", "file", "picture", "map", "imagemap", "image_map"], "image", ""),
+    (&["uv", "uvgrid", "uv_grid", "uv_checker", "color_grid"], "uv-grid", ""),
     // Fields
     (
         &["fov", "fovy", "fov_y", "fov_deg", "vfov", "field_of_view", "angle", "angle_of_view", "yfov"],
@@ -77,6 +78,7 @@ pub(crate) const SYNONYMS: &[(&[&str], &str, &str)] = &[
         "shininess",
         "the exponent of the highlight: larger is smoother",
     ),
+    (&["space", "colorspace", "colour_space", "encoding"], "color_space", "what the picture's numbers mean"),
     (&["filename", "path", "src", "url", "image"], "file", ""),
     (&["vertices", "points", "verts", "vertex"], "positions", ""),
     (&["indices", "faces", "tris"], "triangles", ""),

@@ -282,14 +282,34 @@ impl Value for SamplesDesc {
     }
 }
 
+super::words! {
+    /// The number that a parameter takes from the four of a texture.
+    pub enum Channel {
+        /// Red: of a gray picture, its gray.
+        R = "r",
+        /// Green.
+        G = "g",
+        /// Blue.
+        B = "b",
+        /// Alpha, as it is stored: 0 to 1.
+        A = "a",
+        /// 0.2126 red + 0.7152 green + 0.0722 blue: the luminance of Rec. 709.
+        Luminance = "luminance",
+    }
+}
+
 /// A parameter that a texture can drive: a constant, or `{ texture = "NAME", factor = ... }`, the texture times a
-/// factor.
+/// factor. A number also takes `channel` and `bias`: channel x factor + bias.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamDesc<T> {
     /// The texture's name, if a texture drives it.
     pub texture: Option<String>,
     /// The constant, or the factor of the texture (1 unless said).
     pub factor: T,
+    /// Which number of the texture a number is; `r` unless said. Of colours nothing.
+    pub channel: Channel,
+    /// Added to a number after the factor, from -1e6 to 1e6; 0 unless said. Of colours nothing.
+    pub bias: f64,
 }
 
 /// A colour that a texture can drive.
@@ -300,7 +320,7 @@ pub type NumberParam = ParamDesc<f64>;
 impl<T> ParamDesc<T> {
     /// The same everywhere.
     pub const fn constant(value: T) -> Self {
-        Self { texture: None, factor: value }
+        Self { texture: None, factor: value, channel: Channel::R, bias: 0.0 }
     }
 }
 
@@ -312,14 +332,19 @@ impl ColorParam {
 
     /// The texture `name`, as it is.
     pub fn texture(name: impl Into<String>) -> Self {
-        Self { texture: Some(name.into()), factor: ColorDesc::WHITE }
+        Self { texture: Some(name.into()), ..Self::constant(ColorDesc::WHITE) }
     }
 }
 
 impl NumberParam {
     /// The texture `name`, as it is.
     pub fn texture(name: impl Into<String>) -> Self {
-        Self { texture: Some(name.into()), factor: 1.0 }
+        Self { texture: Some(name.into()), ..Self::constant(1.0) }
+    }
+
+    /// One channel of the texture `name`, as it is.
+    pub fn channel(name: impl Into<String>, channel: Channel) -> Self {
+        Self { channel, ..Self::texture(name) }
     }
 }
 
@@ -339,14 +364,18 @@ impl From<[f64; 3]> for ColorParam {
 /// What a texture can drive, and the factor that leaves a texture as it is.
 trait Factor: Value {
     const ONE: Self;
+    /// The keys of its table.
+    const KEYS: &'static [&'static str];
 }
 
 impl Factor for f64 {
     const ONE: Self = 1.0;
+    const KEYS: &'static [&'static str] = &["texture", "channel", "factor", "bias"];
 }
 
 impl Factor for ColorDesc {
     const ONE: Self = ColorDesc::WHITE;
+    const KEYS: &'static [&'static str] = &["texture", "factor"];
 }
 
 impl<T: Factor> Value for ParamDesc<T> {
@@ -359,9 +388,13 @@ impl<T: Factor> Value for ParamDesc<T> {
     }
 
     fn schema() -> Json {
+        let mut properties = json!({ "texture": { "type": "string" }, "factor": T::schema() });
+        if T::KEYS.contains(&"channel") {
+            (properties["channel"], properties["bias"]) = (Channel::schema(), f64::schema());
+        }
         let textured = json!({
             "type": "object",
-            "properties": { "texture": { "type": "string" }, "factor": T::schema() },
+            "properties": properties,
             "required": ["texture"],
             "additionalProperties": false,
         });
@@ -376,7 +409,7 @@ impl<T: Factor> Value for ParamDesc<T> {
         let Some(entries) = node.entries() else {
             return T::read(node, reader).map(Self::constant);
         };
-        let meant = reader.unknown_keys(entries, &["texture", "factor"], "a textured value");
+        let meant = reader.unknown_keys(entries, T::KEYS, "a textured value");
         let texture = match node.get("texture") {
             Some(name) => reader.within("texture", |r| String::read(name, r)),
             None if meant.contains(&"texture") => None,
@@ -386,24 +419,31 @@ impl<T: Factor> Value for ParamDesc<T> {
                 None
             }
         };
-        let factor = match node.get("factor") {
-            Some(factor) => reader.within("factor", |r| T::read(factor, r)),
-            None => Some(T::ONE),
-        };
-        Some(Self { texture: Some(texture?), factor: factor? })
+        let found = ["factor", "channel", "bias"]
+            .map(|key| node.get(key).filter(|_| T::KEYS.contains(&key)).map(|node| (node, key)));
+        fn value<V: Value>(found: Option<(&Node, &str)>, reader: &mut Reader<'_>, default: V) -> Option<V> {
+            found.map_or(Some(default), |(node, key)| reader.within(key, |r| V::read(node, r)))
+        }
+        let factor = value(found[0], reader, T::ONE);
+        let channel = value(found[1], reader, Channel::R);
+        let bias = value(found[2], reader, 0.0);
+        Some(Self { texture: Some(texture?), factor: factor?, channel: channel?, bias: bias? })
     }
 
     fn write(&self) -> TextValue {
-        match &self.texture {
-            None => self.factor.write(),
-            Some(name) => {
-                let mut fields = vec![("texture", name.write())];
-                if self.factor != T::ONE {
-                    fields.push(("factor", self.factor.write()));
-                }
-                TextValue::Table(fields)
+        let Some(name) = &self.texture else {
+            return self.factor.write();
+        };
+        let mut fields = vec![("texture", name.write())];
+        let mut add = |is_default: bool, key: &'static str, value: TextValue| {
+            if !is_default && T::KEYS.contains(&key) {
+                fields.push((key, value));
             }
-        }
+        };
+        add(self.channel == Channel::R, "channel", self.channel.write());
+        add(self.factor == T::ONE, "factor", self.factor.write());
+        add(self.bias == 0.0, "bias", self.bias.write());
+        TextValue::Table(fields)
     }
 }
 

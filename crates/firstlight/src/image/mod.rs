@@ -13,6 +13,7 @@ mod error;
 mod exr;
 mod file;
 mod flip;
+mod foreign;
 mod format;
 mod given;
 mod hdr;

@@ -37,7 +37,9 @@ impl MaterialCommonDesc {
 
 impl MaterialCommon {
     /// That of materials that say nothing of it.
-    pub(super) const NONE: MaterialCommon = MaterialCommon { emissive: Param { texture: None, factor: Rgb::BLACK } };
+    pub(super) fn none() -> MaterialCommon {
+        MaterialCommon { emissive: Param::constant(Rgb::BLACK) }
+    }
 
     /// The textures of its parameters.
     pub(super) fn textures(&self) -> [Option<TextureId>; 1] {

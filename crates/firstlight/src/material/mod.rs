@@ -87,7 +87,7 @@ pub enum Reflection {
 impl Material {
     /// That of shapes that name none.
     pub(crate) fn matte() -> Material {
-        Material { reflection: Reflection::Classic(Classic::matte()), common: MaterialCommon::NONE }
+        Material { reflection: Reflection::Classic(Classic::matte()), common: MaterialCommon::none() }
     }
 
     /// The material in numbers at one surface, under such ambient light.
@@ -95,7 +95,7 @@ impl Material {
     pub fn bsdf(&self, si: &SurfaceInteraction, textures: &[Texture], ambient: &Ambient) -> Bsdf {
         let ambient = self.varies_with_view(ambient).then_some((ambient, ViewGeometry { ns: si.ns, wo: si.wo }));
         let color = |param: &Param<Rgb>| param.color(si, textures) * si.color;
-        self.evaluate(color, |param| param.number(si, textures), ambient)
+        self.evaluate(color, |param| param.number(si, textures, 1.0), ambient)
     }
 
     /// The same on any surface, if it is the same on all.

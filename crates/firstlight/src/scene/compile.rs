@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use fearless_simd::Level;
 
-use super::advice::{advise, advise_reflectance};
+use super::advice::advise;
 use super::far::{SceneBall, approach};
 use super::geometry::Geometry;
 use super::model::{Added, Framing};
@@ -14,20 +14,17 @@ use super::occluders::ListedOccluders;
 use super::outline::ShapeOutline;
 use super::place::compile_shapes;
 use super::seen_lights::SeenLights;
+use super::textures::{TextureRequests, Textures};
 use super::{Choices, DisplayEncoding, RenderDesc, Scene, SceneDesc, SceneSummary};
 use crate::camera::{Camera, CameraDesc};
 use crate::color::{Display, Encoding, Rgb};
-use crate::context::{AssetError, Assets, CompileContext, OnCompile};
-use crate::describe::{ColorDesc, ColorParam, Family, NumberParam, SamplesDesc};
+use crate::context::{Assets, CompileContext, OnCompile};
+use crate::describe::{Family, SamplesDesc};
 use crate::error::{Diagnostic, SceneError, Severity};
-use crate::ids::TextureId;
-use crate::image::ImageError;
-use crate::image::read::{Limits, TexelData, Texels, decode};
 use crate::light::{Light, LightDesc, check_samples};
 use crate::material::{Ambient, Material};
 use crate::math::DVec3;
-use crate::shape::{CompileCache, MeshFiles, ShapeDesc, key_of};
-use crate::texture::{CheckerboardDesc, Param, Params, Texture, TextureDesc, TextureSpace};
+use crate::shape::{CompileCache, MeshFiles, ShapeDesc};
 use crate::transform::MAX_TIME;
 
 /// How strict compiling is, and which moment is compiled.
@@ -43,6 +40,9 @@ pub struct CompileOptions {
     pub progress: Option<OnCompile>,
     /// What is kept from one compilation to the next, for a description that is compiled again and again.
     pub cache: Option<CompileCache>,
+    /// Bytes that pictures may take as textures, with their smaller copies; [`TEXTURE_MEMORY`](crate::TEXTURE_MEMORY)
+    /// where it is `None`.
+    pub texture_memory: Option<u64>,
     /// In seconds, from -1e9 to 1e9: where the scene has keys, it is compiled as it is at this time.
     pub time: f64,
 }
@@ -69,8 +69,6 @@ const MIN_TOLERANCE: f64 = 0.25;
 const MAX_TOLERANCE: f64 = 16.0;
 const MIN_FPS: f64 = 0.001;
 const MAX_FPS: f64 = 1e6;
-/// The largest picture file read as a texture, in bytes.
-const MAX_TEXTURE_FILE: u64 = 1 << 30;
 
 impl SceneDesc {
     /// Checks everything and makes the scene.
@@ -109,10 +107,10 @@ impl SceneDesc {
         cx.progress = options.progress.clone();
         cx.between("time", time, -MAX_TIME, MAX_TIME, Some("the moment to compile, in seconds"));
         let picture = self.compile_render(cx);
-        let mut textures = Textures::new(self, assets, cache);
+        let mut textures = TextureRequests::new(self, assets, cache, options.texture_memory);
         textures.check(cx);
         let materials = self.compile_materials(cx, &mut textures);
-        textures.check_unused(cx);
+        let textures = textures.finish(cx);
         let mut files = MeshFiles { cache, ..MeshFiles::default() };
         let geometry = compile_shapes(self, cx, assets, &mut files);
         let origin = cx.origin;
@@ -281,7 +279,7 @@ impl SceneDesc {
         }
     }
 
-    fn compile_materials(&self, cx: &mut CompileContext, textures: &mut Textures) -> Vec<Material> {
+    fn compile_materials(&self, cx: &mut CompileContext, textures: &mut TextureRequests) -> Vec<Material> {
         check_unique(cx, "material", self.materials.iter().map(|(name, m)| (m.kind(), name.as_str())));
         let mut materials = Vec::with_capacity(self.materials.len() + 1);
         for (name, desc) in &self.materials {
@@ -346,8 +344,8 @@ impl SceneDesc {
                 .map(|(d, l)| (d.kind(), d.name(), l.said_samples()))
                 .collect(),
             materials: self.materials.iter().map(|(name, m)| (name.clone(), m.kind())).collect(),
-            textures: textures.sizes(),
-            texture_bytes: textures.bytes(),
+            textures: textures.sizes.clone(),
+            texture_bytes: textures.bytes,
             bounds: None,
             camera: completed.chosen_camera().map(|i| completed.cameras[i].0.clone()).unwrap_or_default(),
         }
@@ -369,8 +367,8 @@ impl SceneDesc {
         (said.render.buffers, said.render.motion_to) = (RenderDesc::default().buffers, None);
         let mut hasher = blake3::Hasher::new();
         hasher.update(said.to_json().as_bytes());
-        for (file, hash) in textures.file_hashes() {
-            hasher.update(file.as_bytes()).update(&[0]).update(&hash);
+        for (file, hash) in &textures.file_hashes {
+            hasher.update(file.as_bytes()).update(&[0]).update(hash);
         }
         for (file, hash) in meshes {
             hasher.update(file.as_bytes()).update(&[0]).update(hash);
@@ -422,7 +420,11 @@ struct Picture {
 const MAX_LIGHT_POINTS: u64 = 1 << 24;
 
 /// Names belong to one thing each, whatever its kind.
-fn check_unique<'a>(cx: &mut CompileContext, family: &str, names: impl Iterator<Item = (&'static str, &'a str)>) {
+pub(super) fn check_unique<'a>(
+    cx: &mut CompileContext,
+    family: &str,
+    names: impl Iterator<Item = (&'static str, &'a str)>,
+) {
     let mut seen = HashMap::new();
     for (kind, name) in names {
         if let Some(first) = seen.insert(name, kind) {
@@ -430,220 +432,4 @@ fn check_unique<'a>(cx: &mut CompileContext, family: &str, names: impl Iterator<
             cx.error(&format!("{family}.{kind}.{name}"), message, Some("rename one of them"));
         }
     }
-}
-
-/// The textures of a scene while its materials ask for them.
-struct Textures<'a> {
-    desc: &'a SceneDesc,
-    assets: &'a dyn Assets,
-    /// Texels of before.
-    cache: Option<&'a CompileCache>,
-    /// Which texture a name means.
-    names: HashMap<&'a str, usize>,
-    /// Each texture as it was asked for: colour and data read the same file differently.
-    ids: HashMap<(usize, TextureSpace), TextureId>,
-    /// The texels of each file and the hash of its bytes; without texels where something stands in for it.
-    files: HashMap<&'a str, (Option<Arc<Texels>>, [u8; 32])>,
-    compiled: Vec<Texture>,
-    /// The files that something stands in for.
-    placeholders: Vec<String>,
-}
-
-impl<'a> Textures<'a> {
-    fn new(desc: &'a SceneDesc, assets: &'a dyn Assets, cache: Option<&'a CompileCache>) -> Self {
-        let names = desc.textures.iter().enumerate().rev().map(|(index, (name, _))| (name.as_str(), index)).collect();
-        Textures {
-            desc,
-            assets,
-            cache,
-            names,
-            placeholders: Vec::new(),
-            ids: HashMap::new(),
-            files: HashMap::new(),
-            compiled: Vec::new(),
-        }
-    }
-
-    /// Finds the faults of all textures, used or not.
-    fn check(&self, cx: &mut CompileContext) {
-        check_unique(cx, "texture", self.desc.textures.iter().map(|(name, t)| (t.kind(), name.as_str())));
-        for (name, desc) in &self.desc.textures {
-            cx.within(&format!("texture.{}.{name}", desc.kind()), |cx| match desc {
-                TextureDesc::Checkerboard(board) => drop(board.compile(cx)),
-                TextureDesc::Image(image) => drop(image.compile(cx, Arc::new(unread()), TextureSpace::Raw)),
-            });
-        }
-    }
-
-    /// Finds the faults of the files that no material asked for, without keeping them.
-    fn check_unused(&mut self, cx: &mut CompileContext) {
-        for (index, (_, desc)) in self.desc.textures.iter().enumerate() {
-            if let TextureDesc::Image(image) = desc
-                && !self.files.contains_key(image.file.0.as_str())
-            {
-                self.load(cx, index, &image.file.0);
-                self.files.remove(image.file.0.as_str());
-                self.placeholders.retain(|file| *file != image.file.0);
-            }
-        }
-    }
-
-    /// The texture called `name`, read as `space` where it does not say itself.
-    fn resolve(
-        &mut self,
-        cx: &mut CompileContext,
-        field: &str,
-        name: &Option<String>,
-        space: TextureSpace,
-    ) -> Option<TextureId> {
-        let name = name.as_ref()?;
-        let textures = &self.desc.textures;
-        let Some(index) = self.names.get(name.as_str()).copied() else {
-            let names: Vec<&str> = textures.iter().map(|(name, _)| name.as_str()).collect();
-            cx.unknown(&format!("{field}.texture"), "texture", name, &names);
-            return None;
-        };
-        if let Some(id) = self.ids.get(&(index, space)) {
-            return Some(*id);
-        }
-        // Faults of the texture itself were found by `check`
-        let silent = &mut CompileContext::default();
-        let texture = match &textures[index].1 {
-            TextureDesc::Checkerboard(board) => Texture::Checkerboard(board.compile(silent)),
-            TextureDesc::Image(image) => match self.load(cx, index, &image.file.0) {
-                Some(texels) => Texture::Image(image.compile(silent, texels, space)),
-                None => Texture::Checkerboard(placeholder().compile(silent)),
-            },
-        };
-        let id = TextureId(self.compiled.len() as u32);
-        self.compiled.push(texture);
-        self.ids.insert((index, space), id);
-        Some(id)
-    }
-
-    /// The texels of `file`; `None`, and a warning, where they cannot be had.
-    fn load(&mut self, cx: &mut CompileContext, index: usize, file: &'a str) -> Option<Arc<Texels>> {
-        if let Some((texels, _)) = self.files.get(file) {
-            return texels.clone();
-        }
-        let name = &self.desc.textures[index].0;
-        let read = self.assets.read(file, MAX_TEXTURE_FILE);
-        let (texels, hash) = match &read {
-            Ok(bytes) => match self.texels(bytes) {
-                Ok((texels, hash)) => (Some(texels), hash),
-                Err(error) => {
-                    let message = match bytes.len() {
-                        0 => format!("{file:?} is empty"),
-                        _ => format!("{file:?} cannot be read as a picture: {error}"),
-                    };
-                    let hint = "magenta and black stand in for it, unless compiled strictly";
-                    cx.outside(|cx| cx.warning(&format!("texture.image.{name}.file"), message, Some(hint)));
-                    (None, [0; 32])
-                }
-            },
-            Err(error) => {
-                let path = format!("texture.image.{name}.file");
-                let message = format!("{file:?}: {error}");
-                match error {
-                    // Not a texture that happens to be missing, but one that may not be read
-                    AssetError::Outside => {
-                        let hint = "copy it there, or allow its folder with --allow-dir";
-                        cx.outside(|cx| cx.error(&path, message, Some(hint)));
-                    }
-                    _ => {
-                        let place = error.slashes(file);
-                        let place = place.as_deref().unwrap_or("it is looked for beside the text that names it");
-                        let hint = format!("{place}; magenta and black stand in for it, unless compiled strictly");
-                        cx.outside(|cx| cx.warning(&path, message, Some(&hint)));
-                    }
-                }
-                (None, [0; 32])
-            }
-        };
-        if texels.is_none() {
-            self.placeholders.push(file.to_owned());
-        }
-        self.files.insert(file, (texels.clone(), hash));
-        texels
-    }
-
-    /// The texels of a picture, and the hash of its bytes.
-    fn texels(&self, bytes: &[u8]) -> Result<(Arc<Texels>, [u8; 32]), ImageError> {
-        let hash = *blake3::hash(bytes).as_bytes();
-        let place = self.cache.map(|cache| (cache, key_of("texels", [&hash[..]])));
-        if let Some(texels) = place.and_then(|(cache, key)| cache.find(&key)) {
-            return Ok((texels, hash));
-        }
-        let texels = Arc::new(decode(bytes, &self.limits())?);
-        if let Some((cache, key)) = place {
-            cache.keep(key, &texels);
-        }
-        Ok((texels, hash))
-    }
-
-    /// What is left of the texels that one scene may have.
-    fn limits(&self) -> Limits {
-        let used: u64 =
-            self.files.values().filter_map(|(t, _)| t.as_ref()).map(|t| t.width as u64 * t.height as u64).sum();
-        let whole = Limits::default();
-        Limits { texels: whole.texels.saturating_sub(used), ..whole }
-    }
-
-    fn sizes(&self) -> Vec<(String, &'static str, Option<[u32; 2]>)> {
-        let size = |desc: &TextureDesc| match desc {
-            TextureDesc::Checkerboard(board) => Some(board.counts),
-            TextureDesc::Image(image) => {
-                let (texels, _) = self.files.get(image.file.0.as_str())?;
-                texels.as_ref().map(|t| [t.width, t.height])
-            }
-        };
-        self.desc.textures.iter().map(|(name, desc)| (name.clone(), desc.kind(), size(desc))).collect()
-    }
-
-    fn bytes(&self) -> u64 {
-        let size = |texels: &Texels| match &texels.data {
-            TexelData::Rgb8(data) => size_of_val(data.as_slice()),
-            TexelData::Rgb16(data) => size_of_val(data.as_slice()),
-        };
-        self.files.values().filter_map(|(texels, _)| texels.as_deref()).map(|texels| size(texels) as u64).sum()
-    }
-
-    /// Each file that was read with the hash of its bytes, in the order of names.
-    fn file_hashes(&self) -> Vec<(&'a str, [u8; 32])> {
-        let mut hashes: Vec<_> = self.files.iter().map(|(file, (_, hash))| (*file, *hash)).collect();
-        hashes.sort_unstable();
-        hashes
-    }
-}
-
-impl Params for Textures<'_> {
-    fn radiance(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb> {
-        let factor = cx.color(&factor_path(field, &param.texture), param.factor);
-        Param { texture: self.resolve(cx, field, &param.texture, TextureSpace::Srgb), factor }
-    }
-
-    fn color(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb> {
-        advise_reflectance(cx, &factor_path(field, &param.texture), param.factor.linear);
-        self.radiance(cx, field, param)
-    }
-
-    fn number(&mut self, cx: &mut CompileContext, field: &str, param: &NumberParam, range: [f64; 2]) -> Param<f32> {
-        let factor = cx.between(&factor_path(field, &param.texture), param.factor, range[0], range[1], None);
-        Param { texture: self.resolve(cx, field, &param.texture, TextureSpace::Raw), factor: factor as f32 }
-    }
-}
-
-/// Where the number of a parameter stands: a constant is the field itself.
-fn factor_path(field: &str, texture: &Option<String>) -> String {
-    if texture.is_some() { format!("{field}.factor") } else { field.to_owned() }
-}
-
-/// What stands in for a picture that cannot be had: magenta and black squares, not to be overlooked.
-fn placeholder() -> CheckerboardDesc {
-    CheckerboardDesc { counts: [8, 8], colors: [ColorDesc::linear(1.0, 0.0, 1.0), ColorDesc::BLACK] }
-}
-
-/// What stands for the texels of a picture while only its other settings are checked.
-fn unread() -> Texels {
-    Texels { width: 1, height: 1, data: TexelData::Rgb8(vec![[0; 3]]) }
 }

@@ -102,7 +102,7 @@ impl SceneDesc {
     pub fn files_mut(&mut self) -> impl Iterator<Item = &mut FilePath> {
         let pictures = self.textures.iter_mut().filter_map(|(_, texture)| match texture {
             TextureDesc::Image(image) => Some(&mut image.file),
-            TextureDesc::Checkerboard(_) => None,
+            TextureDesc::Checkerboard(_) | TextureDesc::UvGrid(_) => None,
         });
         let grouped = self.groups.iter_mut().flat_map(|(_, group)| &mut group.shapes);
         let models = self.shapes.iter_mut().chain(grouped).filter_map(|shape| match shape {

@@ -21,6 +21,7 @@ mod shadow_rays;
 #[cfg(test)]
 mod tests;
 mod text;
+mod textures;
 mod through;
 mod trace;
 mod trees;
@@ -34,6 +35,7 @@ pub use description::{DisplayEncoding, RenderDesc, SceneDesc};
 pub use model::{Added, Framing, ModelSettings, UpAxis, View};
 pub use motion::MotionTo;
 pub use text::{Parsed, reference, schema};
+pub use textures::TEXTURE_MEMORY;
 pub use trace::Hit;
 pub(crate) use trace::TracedHit;
 pub use world::{CameraHit, SurfacePoint};

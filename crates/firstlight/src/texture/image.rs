@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use glam::DVec2;
+use glam::{DMat2, DVec2};
 
-use crate::color::{Encoding, Rgb};
+use super::filter::{Beyond, TexturePlace};
+use super::pyramid::Pyramid;
 use crate::context::CompileContext;
 use crate::describe::{ColorDesc, FilePath, table, words};
-use crate::image::read::{TexelData, Texels};
-use crate::math::Vec2;
+use crate::math::{Vec2, sin_cos_of_turns};
+use crate::shape::{Footprint, UvEdge};
 
 words! {
     /// What a picture shows beyond its edges.
@@ -31,6 +32,11 @@ words! {
         Nearest = "nearest",
         /// The four nearest texel centres, weighted by distance.
         Bilinear = "bilinear",
+        /// Bilinear on the two smaller pictures whose texels are nearest to the footprint's longer axis in size.
+        Trilinear = "trilinear",
+        /// The texels in the ellipse that the footprint is, of ratios up to 16, weighted by their distance; bilinear
+        /// where a texel is larger than the footprint.
+        Anisotropic = "anisotropic",
     }
 }
 
@@ -45,7 +51,8 @@ words! {
 }
 
 table! {
-    /// A picture, PNG or JPEG. Row 0 of the picture is v = 1; texel centres are at (i + 1/2) / width.
+    /// A picture, PNG or JPEG. Row 0 of the picture is v = 1; texel centres are at (i + 1/2) / width. Its coordinate is
+    /// uv x scale, turned by `rotate_deg`, + offset.
     ///
     /// ```toml
     /// [texture.image.bricks]
@@ -59,14 +66,16 @@ table! {
         /// Beyond the edges, along u and v.
         pub wrap: [Wrap; 2] = [Wrap::Repeat, Wrap::Repeat],
         /// How a value is made from texels.
-        pub filter: Filter = Filter::Bilinear,
+        pub filter: Filter = Filter::Anisotropic,
         /// What the picture's numbers mean; without it, `srgb` where it colours and `raw` where it is a number.
-        pub space: Option<TextureSpace> = None,
+        pub color_space: Option<TextureSpace> = None,
         /// The colour beyond the edges under `border`.
         pub border: ColorDesc = ColorDesc::BLACK,
-        /// The picture's coordinate is uv x scale + offset; each number from -1e6 to 1e6.
+        /// Multiplies u and v, before all else; each number from -1e6 to 1e6.
         pub scale: [f64; 2] = [1.0, 1.0],
-        /// See `scale`.
+        /// Turns the scaled coordinate around (0, 0), from u towards v, in degrees; from -36000 to 36000.
+        pub rotate_deg: f64 = 0.0,
+        /// Added to the coordinate, after all else; each number from -1e6 to 1e6.
         pub offset: [f64; 2] = [0.0, 0.0],
     }
 }
@@ -74,124 +83,117 @@ table! {
 /// A picture, ready to be looked up.
 #[derive(Clone, Debug)]
 pub struct ImageTexture {
-    texels: Arc<Texels>,
-    decode: Arc<[f32]>,
-    wrap: [Wrap; 2],
+    pub(super) pyramid: Arc<Pyramid>,
     filter: Filter,
-    border: Rgb,
-    scale: DVec2,
+    beyond: Beyond,
+    /// The picture's coordinate is this times uv, + offset.
+    turn: DMat2,
     offset: DVec2,
+    /// Whether the coordinate turns u into v.
+    is_turned: bool,
 }
 
 impl ImageTextureDesc {
-    /// `space`: what the numbers mean where the description does not say.
-    pub(crate) fn compile(&self, cx: &mut CompileContext, texels: Arc<Texels>, space: TextureSpace) -> ImageTexture {
+    /// Finds its faults, but for those of its file.
+    pub(crate) fn check(&self, cx: &mut CompileContext) {
         for i in 0..2 {
-            let hint = Some("the picture's coordinate is uv x scale + offset");
+            let hint = Some("the picture's coordinate is uv x scale, turned, + offset");
             cx.between(&format!("scale[{i}]"), self.scale[i], -MAX_SCALE, MAX_SCALE, hint);
             cx.between(&format!("offset[{i}]"), self.offset[i], -MAX_SCALE, MAX_SCALE, hint);
         }
-        let space = self.space.unwrap_or(space);
-        let steps = match texels.data {
-            TexelData::Rgb8(_) => 256,
-            TexelData::Rgb16(_) => 65536,
-        };
-        let decode = (0..steps).map(|i| {
-            let stored = i as f64 / (steps - 1) as f64;
-            (match space {
-                TextureSpace::Srgb => Encoding::Srgb.decode(stored),
-                TextureSpace::Raw => stored,
-            }) as f32
-        });
+        cx.between("rotate_deg", self.rotate_deg, -MAX_TURN, MAX_TURN, Some("in degrees"));
+        cx.color("border", self.border);
+    }
+
+    /// The texture, of texels that were made for one use.
+    pub(crate) fn texture(&self, pyramid: Arc<Pyramid>) -> ImageTexture {
+        let (sin, cos) = sin_cos_of_turns(self.rotate_deg / 360.0);
+        let [u, v] = self.scale;
+        let [r, g, b] = self.border.linear.map(|c| c as f32);
         ImageTexture {
-            decode: decode.collect(),
-            texels,
-            wrap: self.wrap,
+            pyramid,
             filter: self.filter,
-            border: cx.color("border", self.border),
-            scale: DVec2::from(self.scale),
+            beyond: Beyond { wrap: self.wrap, border: [r, g, b, 1.0] },
+            turn: DMat2::from_cols(DVec2::new(cos, sin) * u, DVec2::new(-sin, cos) * v),
             offset: DVec2::from(self.offset),
+            is_turned: sin != 0.0,
         }
     }
 }
 
 const MAX_SCALE: f64 = 1e6;
+/// Degrees; a hundred times around.
+const MAX_TURN: f64 = 36000.0;
 
 impl ImageTexture {
-    /// The picture at `uv`, linear.
-    pub fn color(&self, uv: Vec2) -> Rgb {
+    /// Red, green, blue and alpha at `uv`, over a footprint that is `scale` times as large.
+    pub fn value(&self, uv: Vec2, footprint: &Footprint, scale: f32) -> [f32; 4] {
+        let place = self.place(uv, footprint, scale);
+        if self.pyramid.mask.is_some() {
+            return [self.pyramid.share(self.filter, &place, &self.beyond); 4];
+        }
+        self.pyramid.value(self.filter, &place, &self.beyond)
+    }
+
+    /// Of a picture for a mask: whether it is solid at a point.
+    #[allow(dead_code, reason = "materials with masks come next")]
+    pub(crate) fn is_solid(&self, uv: Vec2) -> bool {
+        let none = Footprint { dx: Vec2::ZERO, dy: Vec2::ZERO, edges: [UvEdge::Unbounded; 2] };
+        self.value(uv, &none, 1.0)[0] >= 0.5
+    }
+
+    fn place(&self, uv: Vec2, footprint: &Footprint, scale: f32) -> TexturePlace {
         // In texels; row 0 of the picture is v = 1. In f64: a repeated picture has coordinates far from 0
-        let at = uv.as_dvec2() * self.scale + self.offset;
-        let (x, y) = (at.x * self.texels.width as f64, (1.0 - at.y) * self.texels.height as f64);
-        match self.filter {
-            Filter::Nearest => self.texel(x.floor() as i64, y.floor() as i64),
-            Filter::Bilinear => {
-                let (x, y) = (x - 0.5, y - 0.5);
-                let (i, j) = (x.floor(), y.floor());
-                let (s, t) = ((x - i) as f32, (y - j) as f32);
-                let (i, j) = (i as i64, j as i64);
-                let row = |j: i64| self.texel(i, j) * (1.0 - s) + self.texel(i + 1, j) * s;
-                row(j) * (1.0 - t) + row(j + 1) * t
+        let size = self.pyramid.size().map(f64::from);
+        let at = self.turn * uv.as_dvec2() + self.offset;
+        let step = |step: Vec2| self.turn * (step.as_dvec2() * f64::from(scale)) * DVec2::new(size[0], -size[1]);
+        // Where the surface ends, nothing beyond counts
+        let within = [0, 1].map(|axis| {
+            if footprint.edges[axis] != UvEdge::Bounded || self.is_turned {
+                return None;
             }
+            let ends = [0.0, 1.0].map(|end| {
+                let end = end * self.turn.col(axis)[axis] + self.offset[axis];
+                if axis == 0 { end * size[0] } else { (1.0 - end) * size[1] }
+            });
+            Some([ends[0].min(ends[1]), ends[0].max(ends[1])])
+        });
+        TexturePlace {
+            at: DVec2::new(at.x * size[0], (1.0 - at.y) * size[1]),
+            steps: [step(footprint.dx), step(footprint.dy)],
+            within,
         }
-    }
-
-    /// The texel in column `i`, row `j`, which may lie beyond the picture.
-    fn texel(&self, i: i64, j: i64) -> Rgb {
-        let (Some(i), Some(j)) = (self.wrap[0].index(i, self.texels.width), self.wrap[1].index(j, self.texels.height))
-        else {
-            return self.border;
-        };
-        let at = j * self.texels.width as usize + i;
-        let d = |v: usize| self.decode[v];
-        match &self.texels.data {
-            TexelData::Rgb8(data) => {
-                let [r, g, b] = data[at];
-                Rgb::new(d(r.into()), d(g.into()), d(b.into()))
-            }
-            TexelData::Rgb16(data) => {
-                let [r, g, b] = data[at];
-                Rgb::new(d(r.into()), d(g.into()), d(b.into()))
-            }
-        }
-    }
-}
-
-impl Wrap {
-    /// The texel of `size` that stands at `i`; `None` on the border.
-    fn index(self, i: i64, size: u32) -> Option<usize> {
-        let size = size as i64;
-        let wrapped = match self {
-            Wrap::Repeat => i.rem_euclid(size),
-            Wrap::Mirror => {
-                let k = i.rem_euclid(2 * size);
-                k.min(2 * size - 1 - k)
-            }
-            Wrap::Clamp => i.clamp(0, size - 1),
-            Wrap::Border => i,
-        };
-        (0..size).contains(&wrapped).then_some(wrapped as usize)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::pyramid::TextureUse;
     use super::*;
+    use crate::color::Rgb;
+    use crate::image::read::{TexelSamples, Texels};
 
     /// 2 x 2: red, green over blue, white.
     fn four(filter: Filter, wrap: Wrap) -> ImageTexture {
         let data = vec![[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]];
-        let texels = Texels { width: 2, height: 2, data: TexelData::Rgb8(data) };
+        let data = TexelSamples::U8(data.as_flattened().to_vec());
+        let texels = Texels { width: 2, height: 2, channels: 3, data };
         let desc = ImageTextureDesc {
             filter,
             wrap: [wrap; 2],
             border: ColorDesc::gray(0.5),
-            space: None,
-            file: FilePath("four.png".into()),
-            scale: [1.0, 1.0],
-            offset: [0.0, 0.0],
+            ..ImageTextureDesc::new(FilePath("four.png".into()))
         };
-        desc.compile(&mut CompileContext::default(), Arc::new(texels), TextureSpace::Raw)
+        desc.texture(Arc::new(Pyramid::new(&texels, TextureUse::Color(TextureSpace::Raw))))
+    }
+
+    impl ImageTexture {
+        fn color(&self, uv: Vec2) -> Rgb {
+            let none = Footprint { dx: Vec2::ZERO, dy: Vec2::ZERO, edges: [UvEdge::Unbounded; 2] };
+            let [r, g, b, a] = self.value(uv, &none, 1.0);
+            assert_eq!(a, 1.0);
+            Rgb::new(r, g, b)
+        }
     }
 
     #[test]

@@ -1,16 +1,26 @@
 //! Textures: colours and numbers that change over a surface.
 
 mod checkerboard;
+mod filter;
+#[cfg(test)]
+mod filter_tests;
 mod image;
+mod pyramid;
+mod texels;
+mod uv_grid;
 
 pub use checkerboard::{Checkerboard, CheckerboardDesc};
 pub use image::{Filter, ImageTexture, ImageTextureDesc, TextureSpace, Wrap};
+pub use uv_grid::UvGridDesc;
+
+pub(crate) use pyramid::{MaskRule, Pyramid, TextureUse};
 
 use crate::color::Rgb;
 use crate::context::CompileContext;
-use crate::describe::{ColorParam, NumberParam, family};
+use crate::describe::{Channel, ColorParam, NumberParam, family};
 use crate::ids::TextureId;
-use crate::shape::SurfaceInteraction;
+use crate::math::Vec2;
+use crate::shape::{Footprint, SurfaceInteraction, UvEdge};
 
 family! {
     /// A texture as a scene may say it.
@@ -19,6 +29,8 @@ family! {
         Checkerboard(CheckerboardDesc) = "checkerboard",
         /// `[texture.image.NAME]`
         Image(ImageTextureDesc) = "image",
+        /// `[texture.uv-grid.NAME]`
+        UvGrid(UvGridDesc) = "uv-grid",
     }
 }
 
@@ -27,17 +39,38 @@ family! {
 pub enum Texture {
     /// `[texture.checkerboard.NAME]`
     Checkerboard(Checkerboard),
-    /// `[texture.image.NAME]`
+    /// `[texture.image.NAME]`, and the picture of a `[texture.uv-grid.NAME]`
     Image(ImageTexture),
 }
 
 impl Texture {
-    /// The colour at a surface, linear Rec. 709.
+    /// Red, green, blue, linear Rec. 709 of colours, and alpha at a surface, filtered over its footprint made `scale`
+    /// times as large: 1 for colours, and for data as many as bring a camera ray's footprint to that of its pixel.
+    ///
+    /// Of a normal map x, y and z, the mean of unit vectors: the shorter, the more they differ. Of a mask the share
+    /// that is solid, in all four.
     #[inline]
-    pub fn color(&self, si: &SurfaceInteraction) -> Rgb {
+    pub fn value(&self, si: &SurfaceInteraction, scale: f32) -> [f32; 4] {
         match self {
-            Texture::Checkerboard(board) => board.color(si.uv, &si.footprint),
-            Texture::Image(image) => image.color(si.uv),
+            Texture::Checkerboard(board) => {
+                let Footprint { dx, dy, edges } = si.footprint;
+                let Rgb { r, g, b } = board.color(si.uv, &Footprint { dx: dx * scale, dy: dy * scale, edges });
+                [r, g, b, 1.0]
+            }
+            Texture::Image(image) => image.value(si.uv, &si.footprint, scale),
+        }
+    }
+
+    /// Whether a mask is solid at a point of a surface, on its finest level: what light meets.
+    #[inline]
+    #[allow(dead_code, reason = "materials with masks come next")]
+    pub(crate) fn is_solid(&self, uv: Vec2) -> bool {
+        match self {
+            Texture::Checkerboard(board) => {
+                let point = Footprint { dx: Vec2::ZERO, dy: Vec2::ZERO, edges: [UvEdge::Unbounded; 2] };
+                board.color(uv, &point).r >= 0.5
+            }
+            Texture::Image(image) => image.is_solid(uv),
         }
     }
 
@@ -59,28 +92,46 @@ impl Texture {
 }
 
 /// Where the parameters of materials come from: numbers, and textures by name.
+#[allow(dead_code, reason = "materials with maps and masks come next")]
 pub(crate) trait Params {
-    /// A radiance: 0 or more in each channel.
+    /// A radiance: 0 or more in each channel. What alpha its texture has does not matter to it.
     fn radiance(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb>;
+
     /// A reflectance: the same, and advice where it is more than 1.
     fn color(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb>;
+
+    /// A colour whose texture's alpha says where there is anything: smaller pictures are weighted by it. The alpha of
+    /// [`Texture::value`] goes with it.
+    fn covered_color(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb>;
+
+    /// A number in a range.
     fn number(&mut self, cx: &mut CompileContext, field: &str, param: &NumberParam, range: [f64; 2]) -> Param<f32>;
+
+    /// The share of a texture on which a number is at or above a cutoff. Of a constant 0 or 1.
+    fn mask(&mut self, cx: &mut CompileContext, field: &str, param: &NumberParam, cutoff: f64) -> Param<f32>;
+
+    /// The normal map called `texture`.
+    fn normals(&mut self, cx: &mut CompileContext, field: &str, texture: &str) -> Option<TextureId>;
 }
 
 /// A parameter of a material: the same everywhere, or a texture times a factor. `Param<Rgb>` is colour, `Param<f32>`
 /// data.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Param<T> {
     /// The texture, if one drives it.
     pub texture: Option<TextureId>,
     /// The constant, or the texture's factor.
     pub factor: T,
+    /// Which number of the texture a number is.
+    pub channel: Channel,
+    /// Added to a number after the factor.
+    pub bias: f32,
 }
 
 impl<T> Param<T> {
     /// The same everywhere.
     pub(crate) fn constant(factor: T) -> Self {
-        Param { texture: None, factor }
+        Param { texture: None, factor, channel: Channel::R, bias: 0.0 }
     }
 }
 
@@ -88,20 +139,37 @@ impl Param<Rgb> {
     /// The colour at a surface.
     #[inline]
     pub fn color(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Rgb {
+        self.color_and_alpha(si, textures).0
+    }
+
+    /// The colour at a surface, and the alpha of its texture; 1 without one.
+    #[inline]
+    pub fn color_and_alpha(&self, si: &SurfaceInteraction, textures: &[Texture]) -> (Rgb, f32) {
         match self.texture {
-            None => self.factor,
-            Some(id) => textures[id.index()].color(si) * self.factor,
+            None => (self.factor, 1.0),
+            Some(id) => {
+                let [r, g, b, a] = textures[id.index()].value(si, 1.0);
+                (Rgb::new(r, g, b) * self.factor, a)
+            }
         }
     }
 }
 
 impl Param<f32> {
-    /// The number at a surface: the texture's red channel times the factor.
+    /// The number at a surface: the texture's channel times the factor, and the bias.
+    ///
+    /// `scale`: see [`Texture::value`].
     #[inline]
-    pub fn number(&self, si: &SurfaceInteraction, textures: &[Texture]) -> f32 {
+    pub fn number(&self, si: &SurfaceInteraction, textures: &[Texture], scale: f32) -> f32 {
         match self.texture {
             None => self.factor,
-            Some(id) => textures[id.index()].color(si).r * self.factor,
+            Some(id) => self.of(textures[id.index()].value(si, scale)),
         }
+    }
+
+    /// The number that it takes from the value of its texture.
+    #[inline]
+    pub fn of(&self, value: [f32; 4]) -> f32 {
+        pyramid::number(value, self.channel) * self.factor + self.bias
     }
 }
