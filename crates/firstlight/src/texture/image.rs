@@ -175,7 +175,7 @@ mod tests {
 
     /// 2 x 2: red, green over blue, white.
     fn four(filter: Filter, wrap: Wrap) -> ImageTexture {
-        let data = vec![[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]];
+        let data = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]];
         let data = TexelSamples::U8(data.as_flattened().to_vec());
         let texels = Texels { width: 2, height: 2, channels: 3, data };
         let desc = ImageTextureDesc {
