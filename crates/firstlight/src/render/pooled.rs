@@ -67,9 +67,10 @@ pub(crate) struct PooledVisibility {
     value: Rgb,
 }
 
-/// A number that differs between neighbouring pixels, and between surfaces in a pixel.
-pub(crate) fn salt([i, j]: [u32; 2], surface: SurfaceId) -> u32 {
-    i ^ j.rotate_left(16) ^ surface.index() as u32
+/// A number that differs between pixels, and between surfaces in a pixel, without a pattern: the errors of neighbouring
+/// pixels would make one too.
+pub(crate) fn salt([i, j]: [u32; 2], surface: SurfaceId) -> u64 {
+    mix(mix(u64::from(i) << 32 | u64::from(j)) ^ surface.index() as u64)
 }
 
 impl PooledVisibility {
@@ -80,7 +81,7 @@ impl PooledVisibility {
         scale: Rgb,
         rays: usize,
         share: f32,
-        salt: u32,
+        salt: u64,
         others: Rgb,
         sampled_lights: usize,
     ) -> Self {
@@ -92,8 +93,7 @@ impl PooledVisibility {
             each: share / rays as f32,
             others,
             sampled_lights,
-            // Without a pattern: the errors of neighbouring pixels would make one too
-            series: mix(salt.into()) as usize % SERIES,
+            series: salt as usize % SERIES,
             pending: Vec::new(),
             receivers: Vec::new(),
             rays: 0,
@@ -190,7 +190,7 @@ impl PooledVisibility {
     pub fn of_points(
         light: usize,
         points: &[ShadingPoint],
-        salt: u32,
+        salt: u64,
         lights: &mut DirectLighting,
         counts: &mut Counts,
     ) -> PooledLight {
