@@ -119,7 +119,7 @@ pub(crate) struct Tolerance {
 /// The constants that decide an error.
 pub(crate) const TOLERANCE: Tolerance = Tolerance {
     point: 0.15,
-    by_chance: 3.2,
+    by_chance: 3.1,
     least_share: 1.0 / 16.0,
     part: 0.5,
     fit_cut: 0.1,

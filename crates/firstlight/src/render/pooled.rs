@@ -67,10 +67,11 @@ pub(crate) struct PooledVisibility {
     value: Rgb,
 }
 
-/// A number that differs between pixels, and between surfaces in a pixel, without a pattern: the errors of neighbouring
-/// pixels would make one too.
+/// A number that decides which series of points a pixel samples: different in the four pixels of a block of two by two,
+/// so that their errors differ, and without a pattern from block to block, which errors would show.
 pub(crate) fn salt([i, j]: [u32; 2], surface: SurfaceId) -> u64 {
-    mix(mix(u64::from(i) << 32 | u64::from(j)) ^ surface.index() as u64)
+    let block = mix(mix(u64::from(i / 2) << 32 | u64::from(j / 2)) ^ surface.index() as u64);
+    block ^ u64::from((i & 1) << 2 | (j & 1) << 3)
 }
 
 impl PooledVisibility {
