@@ -104,8 +104,8 @@ impl Material {
         is_plain.then(|| self.evaluate(|param| param.factor, |param| param.factor, None))
     }
 
-    /// The material in numbers, from the values of its parameters. `ambient`: the light to
-    /// which the answer varies with the directions at the surface, if it does.
+    /// The material in numbers, from the values of its parameters. `ambient`: the light to which the answer varies with
+    /// the directions at the surface, if it does.
     #[inline(always)]
     fn evaluate(
         &self,
