@@ -304,7 +304,7 @@ def test_pictures_in_memory_are_part_of_a_scene():
     from firstlight._models import png
 
     noise = np.random.default_rng(1).integers(0, 256, size=(5, 7, 3), dtype=np.uint8)
-    text = '[camera]\nposition = [0, 0, 5]\n[texture.image.t]\nfile = "t.png"\n'
+    text = '[camera]\nposition = [0, 0, 5]\n[texture.image.t]\nfile = "t.png"\nfilter = "bilinear"\n'
     text += '[material.phong.m]\ndiffuse = { texture = "t" }\n[[rectangle]]\ncenter = [0, 0, 0]\nsize = [7, 5]\n'
     text += 'normal = [0, 0, 1]\nmaterial = "m"\n[render]\nwidth = 7\nheight = 5\nantialiasing = 1\n'
     text = text.replace("0, 0, 5]\n", '0, 0, 5]\nprojection = "orthographic"\nheight = 5\n')

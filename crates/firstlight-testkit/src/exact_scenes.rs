@@ -41,7 +41,7 @@ fn exposed(mut scene: SceneDesc, random: &mut Random, is_integrated: bool) -> Op
     // A small picture; where other points make no other one, there is nothing to integrate
     let mut small = with_samples(&scene, 36, SampleSet::Grid, 0);
     (small.render.width, small.render.height, small.render.antialiasing) = (16, 16, 1);
-    (small.render.ambient, small.render.exposure) = (ColorDesc::gray(0.0), 0.0);
+    (small.render.ambient, small.render.exposure) = (ColorDesc::gray(0.0).into(), 0.0);
     let one = picture(&compile(&small), &traced());
     let other = picture(&compile(&with_samples(&small, 36, SampleSet::Uniform, 1)), &traced());
     let differs = |(a, b): (&[f32; 4], &[f32; 4])| (0..3).any(|k| (a[k] - b[k]).abs() > 0.01 * a[k].max(b[k]));
@@ -101,10 +101,9 @@ fn composed(random: &mut Random) -> SceneDesc {
         scene = scene.with_material(&format!("material {i}"), material);
     }
     if random.chance(0.3) {
-        scene.render.ambient = tint(random);
-        for channel in &mut scene.render.ambient.linear {
-            *channel *= 0.1;
-        }
+        let mut ambient = tint(random);
+        ambient.linear = ambient.linear.map(|channel| channel * 0.1);
+        scene.render.ambient = ambient.into();
     }
     let stage = Stage::new(random);
     scene = stage.set(random, scene);

@@ -24,7 +24,7 @@ pub fn scene(seed: u64) -> SceneDesc {
     scene.render.transparent = random.chance(0.2);
     if random.chance(0.4) {
         scene.render.background = color(random);
-        scene.render.ambient = color(random);
+        scene.render.ambient = color(random).into();
     }
     for i in 0..1 + random.below(4) {
         if random.chance(0.4) {

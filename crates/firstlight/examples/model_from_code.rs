@@ -40,7 +40,7 @@ fn scene(width: u32, height: u32) -> SceneDesc {
     let mut desc = SceneDesc::default();
     desc.render.width = width;
     desc.render.height = height;
-    desc.render.ambient = ColorDesc::gray(0.05);
+    desc.render.ambient = ColorDesc::gray(0.05).into();
     // The name of the only camera may be empty
     let camera = CameraDesc { look_at: [0.0, 0.9, 0.0], fov_y_deg: Some(32.0), ..CameraDesc::new([2.5, 3.4, 6.0]) };
     desc.cameras.push((String::new(), camera));

@@ -407,6 +407,6 @@ pub fn pixel(scene: &Scene, at: [u32; 2], choose: &mut ChoosePoints) -> [f32; 4]
 
 /// Where light is gathered on a surface.
 fn viewpoint(scene: &Scene, si: &SurfaceInteraction) -> Viewpoint {
-    let bsdf = scene.materials[si.material.index()].bsdf(si, &scene.textures);
-    Viewpoint::of(&ShadingPoint::of(si, &bsdf, scene.ambient))
+    let bsdf = scene.bsdf(si);
+    Viewpoint::of(&ShadingPoint::of(si, &bsdf, &scene.ambient))
 }

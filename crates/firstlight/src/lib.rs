@@ -99,7 +99,10 @@ pub use light::{
     DirectionalDesc, DiskLightDesc, EmitSides, Falloff, LightDesc, PointDesc, RectangleDesc, SampleSet,
     SphereLightDesc, SpotDesc,
 };
-pub use material::{AlphaMode, BlinnPhongDesc, MaterialCommonDesc, MaterialDesc, PhongDesc};
+pub use material::{
+    AlphaMode, AmbientDesc, AmbientGradientDesc, BlinnPhongDesc, MaterialCommonDesc, MaterialDesc,
+    MetallicRoughnessDesc, PhongDesc, UnlitDesc,
+};
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
 pub use render::{LightCounts, RenderStats, render, render_image};
 pub use scene::{

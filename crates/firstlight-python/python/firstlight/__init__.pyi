@@ -328,11 +328,18 @@ class Scene:
         *,
         file: str,
         wrap: Sequence[Any] = ...,
-        filter: Literal["nearest", "bilinear"] = ...,
-        space: Literal["srgb", "raw"] | None = ...,
+        filter: Literal["nearest", "bilinear", "trilinear", "anisotropic"] = ...,
+        color_space: Literal["srgb", "raw"] | None = ...,
         border: Color = ...,
         scale: Vector = ...,
+        rotate_deg: float = ...,
         offset: Vector = ...,
+    ) -> Handle: ...
+    def add_uv_grid_texture(
+        self,
+        name: str,
+        *,
+        counts: Sequence[int] = ...,
     ) -> Handle: ...
     def add_phong_material(
         self,
@@ -342,6 +349,8 @@ class Scene:
         specular: ColorParam = ...,
         ambient: ColorParam | None = ...,
         shininess: NumberParam = ...,
+        emissive: ColorParam = ...,
+        emissive_strength: float = ...,
     ) -> Handle: ...
     def add_blinn_phong_material(
         self,
@@ -351,6 +360,30 @@ class Scene:
         specular: ColorParam = ...,
         ambient: ColorParam | None = ...,
         shininess: NumberParam = ...,
+        emissive: ColorParam = ...,
+        emissive_strength: float = ...,
+    ) -> Handle: ...
+    def add_metallic_roughness_material(
+        self,
+        name: str,
+        *,
+        base_color: ColorParam = ...,
+        metallic: NumberParam = ...,
+        roughness: NumberParam = ...,
+        ior: float = ...,
+        specular: NumberParam = ...,
+        specular_color: ColorParam = ...,
+        occlusion: NumberParam = ...,
+        emissive: ColorParam = ...,
+        emissive_strength: float = ...,
+    ) -> Handle: ...
+    def add_unlit_material(
+        self,
+        name: str,
+        *,
+        color: ColorParam = ...,
+        emissive: ColorParam = ...,
+        emissive_strength: float = ...,
     ) -> Handle: ...
     def add_sphere(
         self,

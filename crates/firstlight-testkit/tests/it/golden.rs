@@ -144,9 +144,8 @@ fn hold_bits(title: &str, path: &Path, actual: &Image) {
 }
 
 /// The steps of an 8-bit picture by which a pixel that is lit once may be off the mean of its rays, each lit by itself.
-/// Behind what is in trees both are estimates: the worst pixel of a scene is off by up to 2, the mean of rays by up to
-/// 0.5.
-const ONCE: f64 = 2.5;
+/// Behind what is in trees both are estimates.
+const ONCE: f64 = 1.5;
 
 /// What is lit once is as if each ray was.
 fn hold_lit_once(scene: &Scene) {

@@ -126,8 +126,8 @@ prop_compose! {
     ) -> RenderDesc {
         RenderDesc {
             width: size[0], height: size[1], antialiasing: size[2], samples, camera, background: colors[0],
-            transparent, ambient: colors[1], display, gamma, exposure, fps, shadow_terminator, tolerance, buffers,
-            motion_to,
+            transparent, ambient: colors[1].into(), display, gamma, exposure, fps, shadow_terminator, tolerance,
+            buffers, motion_to,
         }
     }
 }

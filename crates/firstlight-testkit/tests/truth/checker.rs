@@ -16,7 +16,7 @@ fn board(width: u32, height: u32, counts: [u32; 2], colors: [V; 2]) -> SceneDesc
     let mut scene = empty(width, height, 1)
         .with_texture("board", checkerboard(counts, colors))
         .with_material("board", phong(ColorParam::texture("board"), ColorParam::gray(0.0), 1.0));
-    scene.render.ambient = ColorDesc::WHITE;
+    scene.render.ambient = ColorDesc::WHITE.into();
     scene.render.transparent = true;
     scene
 }

@@ -52,7 +52,7 @@ fn stage(seed: u64) -> SceneDesc {
         scene = scene.with_shape(ShapeDesc::Mesh(box_mesh([-1.5, 0.6, 1.5], [0.8, 1.2, 0.5])));
     }
     if seed % 3 == 1 {
-        scene.render.ambient = ColorDesc::gray(0.03);
+        scene.render.ambient = ColorDesc::gray(0.03).into();
     }
     scene
 }
@@ -115,7 +115,7 @@ fn all_lights(desc: &SceneDesc) -> Image {
         let mut part = desc.clone();
         part.lights = lights.to_vec();
         if sum.is_some() {
-            part.render.ambient = ColorDesc::gray(0.0);
+            part.render.ambient = ColorDesc::gray(0.0).into();
         }
         let image = picture(&compile(&part), &adaptive());
         match &mut sum {

@@ -296,7 +296,7 @@ fn poles_and_seams_are_finite() {
                         ..point(mul(at, distance), 1.0)
                     }));
                 let mut ambient = scene.clone().lit_by(&[]);
-                ambient.render.ambient = firstlight::ColorDesc::WHITE;
+                ambient.render.ambient = firstlight::ColorDesc::WHITE.into();
                 for (i, p) in shoot(&scene).pixels.iter().enumerate() {
                     assert!(p.iter().all(|c| c.is_finite() && *c >= 0.0), "{uv:?} {at:?} {distance} pixel {i}: {p:?}");
                 }
@@ -323,7 +323,7 @@ fn texture_coordinates_follow_skewed_edges() {
                     material: Some("board".into()),
                     ..parallelogram(p, e0, e1)
                 });
-            scene.render.ambient = firstlight::ColorDesc::WHITE;
+            scene.render.ambient = firstlight::ColorDesc::WHITE.into();
             for i in 0..5 {
                 for j in 0..3 {
                     // The middle of a square and places near its corners
@@ -355,7 +355,7 @@ fn a_parallelogram_seen_edge_on_is_finite() {
                 })
                 .with_light(LightDesc::Point(point([0.5, 1.0, 0.5], 1.0)))
                 .with_light(LightDesc::Point(point([0.5, 0.0, 0.5], 1.0)));
-            scene.render.ambient = firstlight::ColorDesc::gray(0.1);
+            scene.render.ambient = firstlight::ColorDesc::gray(0.1).into();
             for (i, p) in shoot(&scene).pixels.iter().enumerate() {
                 assert!(p.iter().all(|c| c.is_finite() && *c >= 0.0), "from {eye:?}, tilt {tilt}, pixel {i}: {p:?}");
             }

@@ -181,7 +181,7 @@ impl<'a> Center<'a> {
             }
             Plane::Albedo => {
                 let Scene { materials, textures, .. } = self.scene;
-                let color = self.surface().map(|si| materials[si.material.index()].bsdf(si, textures).colors.cosine());
+                let color = self.surface().map(|si| materials[si.material.index()].albedo(si, textures));
                 vector(color.map_or(Vec3::ZERO, |Rgb { r, g, b }| Vec3::new(r, g, b)))
             }
             Plane::InstanceId => CenterValue::Whole(self.space().map_or(0, |space| space.instance)),

@@ -239,17 +239,29 @@ fn emitted(
             "its receipt does not say how many camera rays it has: antialiasing, 1 to {MAX_ANTIALIASING}"
         ))
     })?;
-    let mut sums = vec![Emission::default(); emission.len() / 3];
-    for (light, scale) in before.iter().zip(after) {
-        let Some(seen) = &light.seen else { continue };
-        let shares = floats(file, seen, 1)?;
-        if let Some(share) = shares.iter().find(|share| !(0.0..=1.0).contains(*share)) {
-            return Err(RelightError(format!("a pixel of its buffer {seen} is {share}, which is no share: 0 to 1")));
+    let of_lights = |scales: &mut dyn Iterator<Item = LightScale>| {
+        let mut sums = vec![Emission::default(); emission.len() / 3];
+        for (light, scale) in before.iter().zip(scales) {
+            let Some(seen) = &light.seen else { continue };
+            let shares = floats(file, seen, 1)?;
+            if let Some(share) = shares.iter().find(|share| !(0.0..=1.0).contains(*share)) {
+                return Err(RelightError(format!(
+                    "a pixel of its buffer {seen} is {share}, which is no share: 0 to 1"
+                )));
+            }
+            let radiance = scale.radiance();
+            for (sum, share) in sums.iter_mut().zip(shares) {
+                sum.add(radiance, whole_rays(f64::from(*share) * f64::from(rays)));
+            }
         }
-        let radiance = scale.radiance();
-        for (sum, share) in sums.iter_mut().zip(shares) {
-            sum.add(radiance, whole_rays(f64::from(*share) * f64::from(rays)));
-        }
+        Ok(sums.into_iter().flat_map(|sum| sum.mean(rays).to_array()).collect::<Vec<f32>>())
+    };
+    if of_lights(&mut before.iter().map(|light| light.scale))? != emission {
+        return Err(RelightError(
+            "surfaces in it emit light, which is not told apart from that of its visible lights: change lights with \
+             visible = false, or render again"
+                .to_owned(),
+        ));
     }
-    Ok(sums.into_iter().flat_map(|sum| sum.mean(rays).to_array()).collect())
+    of_lights(&mut after.iter().copied())
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::color::Rgb;
 use crate::image::{Buffer, LightPart, Plane};
-use crate::material::{Bsdf, Colors, MOMENTS};
+use crate::material::{LightTerm, PARTS};
 use crate::scene::Scene;
 
 /// A term of a pixel's colour: a mean over its rays.
@@ -47,17 +47,17 @@ struct KeptSum {
 pub(crate) struct PixelTerms {
     /// The parts of rays that nothing stops: 1 of each without a hit.
     pub background: f64,
-    /// The emission of visible lights.
+    /// The emission of visible lights and of surfaces.
     pub emission: Emission,
     pub ambient: Rgb,
 }
 
-/// The sum of the emission of visible lights over rays. In 64 bits, so that it does not depend on the order.
+/// The sum of emission over rays. In 64 bits, so that it does not depend on the order.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Emission([f64; 3]);
 
 impl Emission {
-    /// Adds the radiance of a light that `rays` rays meet, parts of rays included.
+    /// Adds the radiance of what `rays` rays meet, parts of rays included.
     pub fn add(&mut self, radiance: Rgb, rays: f64) {
         for (sum, radiance) in self.0.iter_mut().zip(radiance.to_array()) {
             *sum += f64::from(radiance) * rays;
@@ -70,10 +70,8 @@ impl Emission {
     }
 }
 
-/// The reflected light of one light, summed over the rays of a pixel, without the light's scale: diffuse and specular.
-pub(crate) type LightTerm = Colors;
-
-/// The same with the light and its scale; `None` is all lights that a cut takes together.
+/// The reflected light of one light, summed over the rays of a pixel, and the light's scale, which is not in it; `None`
+/// is all lights that a cut takes together.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScaledTerm {
     pub light: Option<u32>,
@@ -89,19 +87,13 @@ impl ScaledTerm {
 }
 
 impl PixelTerms {
-    /// Adds what a surface emits, and its answer to ambient light, that `rays` rays see.
-    pub fn see(&mut self, scene: &Scene, bsdf: &Bsdf, rays: u32) {
-        self.emission.add(bsdf.emission, rays.into());
-        self.ambient += bsdf.ambient_light(scene.ambient) * rays as f32;
-    }
-
     /// Adds the terms of single lights, which are no terms of the colour, to the sums of pixel `at` for buffers.
     pub fn keep_apart(scene: &Scene, lights: &[ScaledTerm], at: usize, sums: &mut TermSums) {
         let rays = (scene.antialiasing * scene.antialiasing) as f32;
         for ScaledTerm { light, scale, term } in lights {
             let Some(light) = *light else { continue };
-            for (moment, part) in term.0.into_iter().enumerate() {
-                sums.keep(at, Term::Apart(light, moment), *scale, std::iter::once(part * (1.0 / rays)));
+            for (part, value) in term.0.into_iter().enumerate() {
+                sums.keep(at, Term::Apart(light, part), *scale, std::iter::once(value * (1.0 / rays)));
             }
         }
     }
@@ -119,8 +111,8 @@ impl PixelTerms {
         add(Term::Emission, Rgb::WHITE, self.emission.mean(scene.antialiasing * scene.antialiasing));
         add(Term::Ambient, Rgb::WHITE, mean(self.ambient));
         for ScaledTerm { light, scale, term } in lights {
-            for (moment, part) in term.0.into_iter().enumerate() {
-                add(Term::Light(light, moment), scale, mean(part));
+            for (part, value) in term.0.into_iter().enumerate() {
+                add(Term::Light(light, part), scale, mean(value));
             }
         }
     }
@@ -134,8 +126,8 @@ impl Term {
             Term::Background => 0,
             Term::Emission => 1,
             Term::Ambient => 2,
-            Term::Light(light, moment) => 3 + light.map_or(0, |light| light as usize + 1) * MOMENTS + moment,
-            Term::Apart(light, moment) => 3 + (1 + lights + light as usize) * MOMENTS + moment,
+            Term::Light(light, part) => 3 + light.map_or(0, |light| light as usize + 1) * PARTS + part,
+            Term::Apart(light, part) => 3 + (1 + lights + light as usize) * PARTS + part,
         }
     }
 
@@ -152,7 +144,7 @@ impl Term {
             Buffer::Light(_, part) | Buffer::Group(_, part) => {
                 let moments = match part.and_then(LightPart::moment) {
                     Some(moment) => moment..moment + 1,
-                    None => 0..MOMENTS,
+                    None => 0..PARTS,
                 };
                 let lights = scene.lights_of(buffer);
                 let terms = |light| {

@@ -28,7 +28,7 @@ use super::{
 use crate::parallel;
 
 /// One channel of a file.
-struct Channel<'a> {
+struct ExrChannel<'a> {
     name: String,
     numbers: PlaneNumbers<'a>,
     kind: SampleType,
@@ -65,7 +65,7 @@ pub(super) fn encode(file: &PlaneFile, settings: &FileSettings, receipt: &Receip
 }
 
 /// The channels of all planes, by name, as the format wants them.
-fn channels<'a>(file: &PlaneFile<'a>, settings: &FileSettings) -> Vec<Channel<'a>> {
+fn channels<'a>(file: &PlaneFile<'a>, settings: &FileSettings) -> Vec<ExrChannel<'a>> {
     let mut all = Vec::new();
     for NamedPlane { name: of, plane, numbers } in file.planes {
         let names = plane.channels();
@@ -80,7 +80,7 @@ fn channels<'a>(file: &PlaneFile<'a>, settings: &FileSettings) -> Vec<Channel<'a
             }
             // The picture's are those of the file itself, and Cryptomatte has its own, as readers expect it
             let name = if plane.names_channels() { (*name).to_owned() } else { format!("{of}.{name}") };
-            all.push(Channel { name, numbers: *numbers, kind, place, of: names.len() });
+            all.push(ExrChannel { name, numbers: *numbers, kind, place, of: names.len() });
         }
     }
     all.sort_by(|a, b| a.name.cmp(&b.name));
@@ -100,7 +100,7 @@ fn texts(file: &PlaneFile, receipt: &Receipt) -> Vec<(String, String)> {
 }
 
 /// Everything that the file says before its pixels.
-fn header(file: &PlaneFile, channels: &[Channel], texts: &[(String, String)]) -> Header {
+fn header(file: &PlaneFile, channels: &[ExrChannel], texts: &[(String, String)]) -> Header {
     let window = file.window;
     let size = Vec2(window.width as usize, window.height as usize);
     let channels = channels.iter().map(|c| ChannelDescription::named(c.name.as_str(), c.kind)).collect();
@@ -129,10 +129,10 @@ fn header(file: &PlaneFile, channels: &[Channel], texts: &[(String, String)]) ->
 }
 
 /// One row after another, and in each one channel after another.
-fn rows_of(channels: &[Channel], rows: Range<usize>, width: usize) -> Vec<u8> {
+fn rows_of(channels: &[ExrChannel], rows: Range<usize>, width: usize) -> Vec<u8> {
     let mut data = Vec::with_capacity(rows.len() * width * channels.len() * 4);
     for row in rows {
-        for Channel { numbers, kind, place, of, .. } in channels {
+        for ExrChannel { numbers, kind, place, of, .. } in channels {
             let all = row * width * of..(row + 1) * width * of;
             match numbers {
                 PlaneNumbers::Floats(numbers) if *kind == SampleType::F16 => {

@@ -1,7 +1,7 @@
 //! Pictures for textures in the formats that the `image` crate reads, and in HDR and EXR.
 //!
-//! Samples stay as they are stored: no profile, no gamma, no orientation is applied. Of an animation the first picture
-//! is taken. HDR and EXR are linear; what is negative or no number is 0.
+//! TexelSamples stay as they are stored: no profile, no gamma, no orientation is applied. Of an animation the first
+//! picture is taken. HDR and EXR are linear; what is negative or no number is 0.
 
 use std::io::Cursor;
 
@@ -10,7 +10,7 @@ use codec::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use super::ImageError;
 use super::contain::contained;
-use super::read::{Limits, PictureHeader, Samples, Texels, check_size};
+use super::read::{Limits, PictureHeader, TexelSamples, Texels, check_size};
 use super::stored::StoredImage;
 
 /// The kinds of files that are read as textures, in the words of errors.
@@ -18,24 +18,26 @@ pub(super) const KINDS: &str = "PNG, JPEG, WebP, TGA, BMP, GIF, TIFF, HDR or EXR
 
 /// A format, by the first bytes of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Foreign {
+pub(super) enum ForeignPicture {
     Coded(ImageFormat, &'static str),
     Hdr,
     Exr,
 }
 
-impl Foreign {
+impl ForeignPicture {
     /// `None` for files of no known kind.
     pub(super) fn of(bytes: &[u8]) -> Option<Self> {
         let starts = |magic: &[u8]| bytes.starts_with(magic);
         Some(match bytes {
-            _ if starts(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") => Foreign::Coded(ImageFormat::WebP, "WebP"),
-            _ if starts(b"GIF87a") || starts(b"GIF89a") => Foreign::Coded(ImageFormat::Gif, "GIF"),
-            _ if starts(b"II*\0") || starts(b"MM\0*") => Foreign::Coded(ImageFormat::Tiff, "TIFF"),
-            _ if starts(b"BM") => Foreign::Coded(ImageFormat::Bmp, "BMP"),
-            _ if starts(b"#?RADIANCE\n") || starts(b"#?RGBE\n") => Foreign::Hdr,
-            _ if starts(&[0x76, 0x2f, 0x31, 0x01]) => Foreign::Exr,
-            _ if is_tga(bytes) => Foreign::Coded(ImageFormat::Tga, "TGA"),
+            _ if starts(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") => {
+                ForeignPicture::Coded(ImageFormat::WebP, "WebP")
+            }
+            _ if starts(b"GIF87a") || starts(b"GIF89a") => ForeignPicture::Coded(ImageFormat::Gif, "GIF"),
+            _ if starts(b"II*\0") || starts(b"MM\0*") => ForeignPicture::Coded(ImageFormat::Tiff, "TIFF"),
+            _ if starts(b"BM") => ForeignPicture::Coded(ImageFormat::Bmp, "BMP"),
+            _ if starts(b"#?RADIANCE\n") || starts(b"#?RGBE\n") => ForeignPicture::Hdr,
+            _ if starts(&[0x76, 0x2f, 0x31, 0x01]) => ForeignPicture::Exr,
+            _ if is_tga(bytes) => ForeignPicture::Coded(ImageFormat::Tga, "TGA"),
             _ => return None,
         })
     }
@@ -43,19 +45,19 @@ impl Foreign {
     /// Size and channels, before anything is decoded.
     pub(super) fn header(self, bytes: &[u8], limits: &Limits) -> Result<PictureHeader, ImageError> {
         match self {
-            Foreign::Coded(format, name) => contained(name, || {
+            ForeignPicture::Coded(format, name) => contained(name, || {
                 let decoder = decoder(bytes, format, name)?;
                 let (width, height) = decoder.dimensions();
                 check_size(width, height, limits)?;
                 let (channels, sample) = kind(decoder.color_type());
                 Ok(PictureHeader { width, height, channels, sample })
             }),
-            Foreign::Hdr => contained("HDR", || {
+            ForeignPicture::Hdr => contained("HDR", || {
                 let (width, height, _) = super::hdr::header(&radiance(bytes)).ok_or_else(|| no_header("HDR"))?;
                 check_size(width, height, limits)?;
                 Ok(PictureHeader { width, height, channels: 3, sample: 4 })
             }),
-            Foreign::Exr => exr_header(bytes, limits),
+            ForeignPicture::Exr => exr_header(bytes, limits),
         }
     }
 
@@ -63,19 +65,21 @@ impl Foreign {
     pub(super) fn decode(self, bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError> {
         let PictureHeader { width, height, channels, .. } = self.header(bytes, limits)?;
         let data = match self {
-            Foreign::Coded(format, name) => contained(name, || {
+            ForeignPicture::Coded(format, name) => contained(name, || {
                 let decoded = DynamicImage::from_decoder(decoder(bytes, format, name)?);
                 decoded.map(samples).map_err(|error| damaged(name, &error))
             })?,
-            Foreign::Hdr | Foreign::Exr => {
-                let pixels = if self == Foreign::Hdr {
+            ForeignPicture::Hdr | ForeignPicture::Exr => {
+                let pixels = if self == ForeignPicture::Hdr {
                     StoredImage::read(&radiance(bytes))?.pixels
                 } else {
                     StoredImage::read(bytes)?.pixels
                 };
                 // Light is not negative
                 let number = |v: f32| if v > 0.0 { v.min(MAX_FLOAT) } else { 0.0 };
-                Samples::F32(pixels.iter().flat_map(|pixel| pixel[..channels].iter().copied().map(number)).collect())
+                TexelSamples::F32(
+                    pixels.iter().flat_map(|pixel| pixel[..channels].iter().copied().map(number)).collect(),
+                )
             }
         };
         data.fill(width, height, channels)
@@ -84,9 +88,9 @@ impl Foreign {
 
     fn name(self) -> &'static str {
         match self {
-            Foreign::Coded(_, name) => name,
-            Foreign::Hdr => "HDR",
-            Foreign::Exr => "EXR",
+            ForeignPicture::Coded(_, name) => name,
+            ForeignPicture::Hdr => "HDR",
+            ForeignPicture::Exr => "EXR",
         }
     }
 }
@@ -140,22 +144,22 @@ fn kind(color: ColorType) -> (usize, usize) {
     (channels, usize::from(color.bytes_per_pixel()) / channels.max(1))
 }
 
-fn samples(image: DynamicImage) -> Samples {
+fn samples(image: DynamicImage) -> TexelSamples {
     match image {
-        DynamicImage::ImageLuma8(image) => Samples::U8(image.into_raw()),
-        DynamicImage::ImageLumaA8(image) => Samples::U8(image.into_raw()),
-        DynamicImage::ImageRgb8(image) => Samples::U8(image.into_raw()),
-        DynamicImage::ImageRgba8(image) => Samples::U8(image.into_raw()),
-        DynamicImage::ImageLuma16(image) => Samples::U16(image.into_raw()),
-        DynamicImage::ImageLumaA16(image) => Samples::U16(image.into_raw()),
-        DynamicImage::ImageRgb16(image) => Samples::U16(image.into_raw()),
-        DynamicImage::ImageRgba16(image) => Samples::U16(image.into_raw()),
+        DynamicImage::ImageLuma8(image) => TexelSamples::U8(image.into_raw()),
+        DynamicImage::ImageLumaA8(image) => TexelSamples::U8(image.into_raw()),
+        DynamicImage::ImageRgb8(image) => TexelSamples::U8(image.into_raw()),
+        DynamicImage::ImageRgba8(image) => TexelSamples::U8(image.into_raw()),
+        DynamicImage::ImageLuma16(image) => TexelSamples::U16(image.into_raw()),
+        DynamicImage::ImageLumaA16(image) => TexelSamples::U16(image.into_raw()),
+        DynamicImage::ImageRgb16(image) => TexelSamples::U16(image.into_raw()),
+        DynamicImage::ImageRgba16(image) => TexelSamples::U16(image.into_raw()),
         other => {
             let number = |v: &f32| if *v > 0.0 { v.min(MAX_FLOAT) } else { 0.0 };
             if other.color().has_alpha() {
-                Samples::F32(other.into_rgba32f().as_raw().iter().map(number).collect())
+                TexelSamples::F32(other.into_rgba32f().as_raw().iter().map(number).collect())
             } else {
-                Samples::F32(other.into_rgb32f().as_raw().iter().map(number).collect())
+                TexelSamples::F32(other.into_rgb32f().as_raw().iter().map(number).collect())
             }
         }
     }
@@ -210,7 +214,7 @@ mod tests {
                 let header = read_header(&bytes, &Limits::default()).unwrap();
                 assert_eq!((header.width, header.height, header.channels), (7, 5, texels.channels));
                 assert_eq!(texels.channels, usize::from(expected.color().channel_count()), "{format:?}");
-                assert_eq!(texels.data, Samples::U8(expected.into_bytes()), "{format:?} {color:?}");
+                assert_eq!(texels.data, TexelSamples::U8(expected.into_bytes()), "{format:?} {color:?}");
             }
         }
     }
@@ -221,7 +225,7 @@ mod tests {
         let bytes = encoded(&light.clone().into(), ImageFormat::Hdr);
         for bytes in [bytes.clone(), [b"#?RGBE\n", &bytes[11..]].concat()] {
             let texels = decode(&bytes, &Limits::default()).unwrap();
-            let Samples::F32(samples) = &texels.data else { panic!() };
+            let TexelSamples::F32(samples) = &texels.data else { panic!() };
             assert_eq!((texels.width, texels.height, texels.channels), (3, 2, 3));
             let off = samples.iter().zip(light.as_raw()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             assert!(off < 0.02, "{off}");

@@ -1,5 +1,5 @@
-//! Decoding the pictures that textures are made of, from files that nobody vouches for: PNG and JPEG here, other formats
-//! in `foreign.rs`.
+//! Decoding the pictures that textures are made of, from files that nobody vouches for: PNG and JPEG here, other
+//! formats in `foreign.rs`.
 //!
 //! Only the numbers of the picture count. Colour profiles and gamma chunks are ignored, as glTF demands (glTF 2.0,
 //! "Images"). So is the orientation that a camera wrote into EXIF: uv was made for the texels as they are stored, and a
@@ -21,7 +21,7 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 use super::ImageError;
 use super::contain::contained;
 use super::damage;
-use super::foreign::{Foreign, KINDS};
+use super::foreign::{ForeignPicture, KINDS};
 
 /// How large a picture may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,12 +47,12 @@ pub(crate) struct Texels {
     /// 1: gray, 2: gray and alpha, 3: red, green, blue, 4: those and alpha.
     pub(crate) channels: usize,
     /// `width` x `height` x `channels` samples, texel by texel.
-    pub(crate) data: Samples,
+    pub(crate) data: TexelSamples,
 }
 
-/// Samples as the file has them: encoded as its maker chose, alpha straight; 1, 2 and 4 bits are scaled to 8.
+/// TexelSamples as the file has them: encoded as its maker chose, alpha straight; 1, 2 and 4 bits are scaled to 8.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Samples {
+pub(crate) enum TexelSamples {
     /// 255 is one.
     U8(Vec<u8>),
     /// 65535 is one.
@@ -78,7 +78,7 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError
     } else if bytes.starts_with(JPEG) {
         contained("JPEG", || decode_jpeg(bytes, limits))
     } else {
-        Foreign::of(bytes).ok_or(ImageError::UnknownKind { expected: KINDS })?.decode(bytes, limits)
+        ForeignPicture::of(bytes).ok_or(ImageError::UnknownKind { expected: KINDS })?.decode(bytes, limits)
     }
 }
 
@@ -119,7 +119,7 @@ pub(crate) fn read_header(bytes: &[u8], limits: &Limits) -> Result<PictureHeader
     } else if bytes.starts_with(JPEG) {
         contained("JPEG", || jpeg_header(bytes, limits))
     } else {
-        Foreign::of(bytes).ok_or(ImageError::UnknownKind { expected: KINDS })?.header(bytes, limits)
+        ForeignPicture::of(bytes).ok_or(ImageError::UnknownKind { expected: KINDS })?.header(bytes, limits)
     }
 }
 
@@ -199,8 +199,10 @@ fn decode_png(bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError> {
     }
     let data = match depth {
         // The high byte comes first
-        png::BitDepth::Sixteen => Samples::U16(samples.as_chunks().0.iter().map(|b| u16::from_be_bytes(*b)).collect()),
-        _ => Samples::U8(samples),
+        png::BitDepth::Sixteen => {
+            TexelSamples::U16(samples.as_chunks().0.iter().map(|b| u16::from_be_bytes(*b)).collect())
+        }
+        _ => TexelSamples::U8(samples),
     };
     data.fill(width, height, color.samples()).ok_or_else(|| damaged("rows are missing".into()))
 }
@@ -222,17 +224,17 @@ fn decode_jpeg(bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError> {
     let colors = jpeg_colors(&decoder);
     let options = jpeg_options().jpeg_set_out_colorspace(colors);
     let samples = JpegDecoder::new_with_options(ZCursor::new(bytes), options).decode().map_err(fault)?;
-    let texels = Samples::U8(samples).fill(width, height, colors.num_components());
+    let texels = TexelSamples::U8(samples).fill(width, height, colors.num_components());
     texels.ok_or_else(|| damaged("rows are missing".into()))
 }
 
-impl Samples {
+impl TexelSamples {
     /// `None` if they do not fill the size.
     pub(super) fn fill(self, width: u32, height: u32, channels: usize) -> Option<Texels> {
         let count = match &self {
-            Samples::U8(samples) => samples.len(),
-            Samples::U16(samples) => samples.len(),
-            Samples::F32(samples) => samples.len(),
+            TexelSamples::U8(samples) => samples.len(),
+            TexelSamples::U16(samples) => samples.len(),
+            TexelSamples::F32(samples) => samples.len(),
         };
         let texels = Texels { width, height, channels, data: self };
         (count as u64 == u64::from(width) * u64::from(height) * channels as u64).then_some(texels)
@@ -255,7 +257,7 @@ mod tests {
     fn bytes(name: &str) -> (u32, u32, usize, Vec<u8>) {
         let texels = decode(&data(name), &Limits::default()).unwrap();
         match texels.data {
-            Samples::U8(data) => (texels.width, texels.height, texels.channels, data),
+            TexelSamples::U8(data) => (texels.width, texels.height, texels.channels, data),
             _ => panic!("{name} has not 8 bits"),
         }
     }
@@ -285,12 +287,12 @@ mod tests {
             assert_eq!((texels.width, texels.height), (expected.width(), expected.height()), "{name}");
             assert_eq!(texels.channels, channels, "{name}");
             match texels.data {
-                Samples::U8(got) => assert!(got == expected.into_bytes(), "{name}"),
-                Samples::U16(got) => {
+                TexelSamples::U8(got) => assert!(got == expected.into_bytes(), "{name}"),
+                TexelSamples::U16(got) => {
                     let got: Vec<u8> = got.iter().flat_map(|v| v.to_ne_bytes()).collect();
                     assert!(got == expected.into_bytes(), "{name}");
                 }
-                Samples::F32(_) => panic!("{name}"),
+                TexelSamples::F32(_) => panic!("{name}"),
             }
         }
     }
@@ -303,8 +305,8 @@ mod tests {
         let of = |name: &str| decode(&data(name), &Limits::default()).unwrap();
         let kinds = ["basn0g16.png", "basn6a16.png", "basn4a08.png", "basn3p08.png", "tbbn3p08.png"].map(of);
         assert_eq!(kinds.each_ref().map(|texels| texels.channels), [1, 4, 2, 3, 4]);
-        assert!(kinds[..2].iter().all(|texels| matches!(texels.data, Samples::U16(_))));
-        assert!(kinds[2..].iter().all(|texels| matches!(texels.data, Samples::U8(_))));
+        assert!(kinds[..2].iter().all(|texels| matches!(texels.data, TexelSamples::U16(_))));
+        assert!(kinds[2..].iter().all(|texels| matches!(texels.data, TexelSamples::U8(_))));
     }
 
     #[test]

@@ -54,7 +54,8 @@ pub(crate) enum FrameNumber {
     OutY,
     CosO,
     /// The exponent of the lobe.
-    Shininess,
+    LobeNumber0,
+    LobeNumber1,
     /// The first and last x and y of the light's square.
     X0,
     X1,
@@ -85,13 +86,13 @@ impl LightFrame16 {
     #[inline(always)]
     pub fn set(&mut self, lane: usize, point: &ShadingPoint, v: &LightFrame) {
         let (p, l0, a, b) = (point.p, v.l0, v.a, v.b);
-        let mirror = v.mirror().unwrap_or_default();
+        let (mirror, lobe) = (v.mirror().unwrap_or_default(), point.bsdf.lobe.numbers());
         #[rustfmt::skip]
         let numbers: [f32; NUMBERS] = [
             p.x, p.y, p.z, l0.x, l0.y, l0.z, a.x, a.y, a.z, b.x, b.y, b.z,
             v.fa, v.la, v.skew, v.fb, v.lb, v.height, v.facing, mirror.x, mirror.y, mirror.z,
             v.cos.c, v.cos.x, v.cos.y, v.horizon.c, v.horizon.x, v.horizon.y, v.out.c, v.out.x, v.out.y, v.cos_o,
-            point.bsdf.lobe.shininess(),
+            lobe[0], lobe[1],
             v.x[0], v.x[1], v.y[0], v.y[1], v.origin[0], v.origin[1],
             v.ratio, v.behind2, v.measure,
         ];
@@ -115,8 +116,9 @@ impl LightFrame16 {
         let ns = point_vectors(simd, points, |point| point.ns);
         let wo = point_vectors(simd, points, |point| point.wo);
         // Lanes without a point have the lobe of the last: of one exponent for all, powers are faster
-        for (lane, shininess) in self.0[Shininess as usize].iter_mut().enumerate() {
-            *shininess = points[lane.min(points.len() - 1)].bsdf.lobe.shininess();
+        for lane in 0..LANES {
+            let numbers = points[lane.min(points.len() - 1)].bsdf.lobe.numbers();
+            [self.0[LobeNumber0 as usize][lane], self.0[LobeNumber1 as usize][lane]] = numbers;
         }
         let [a, b, n] = [light.a, light.b, light.n].map(|v| Vec3x16::splat(simd, v));
         let l0 = Exact::new(light.c).seen_from(simd, p);
@@ -269,7 +271,8 @@ impl Members<'_, LightFrame16> {
     /// The lobes of the members, which are of one kind.
     #[inline(always)]
     pub fn lobes<S: Simd>(&self, simd: S, kind: Option<LobeKind>) -> LobeLanes {
-        LobeLanes::new(kind, self.lanes(simd, FrameNumber::Shininess).to_array())
+        use FrameNumber::*;
+        LobeLanes::new(kind, [LobeNumber0, LobeNumber1].map(|number| self.lanes(simd, number).to_array()))
     }
 }
 

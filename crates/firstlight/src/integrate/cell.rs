@@ -307,7 +307,7 @@ pub(crate) fn integrate<S: Simd>(
     let (values, area) = values(simd, &lobes, falloff, members, cells);
     let (zero, one, least) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0), simd.splat_f32x16(f32::MIN_POSITIVE));
     let mut whole_sums = CellQuadrature::default();
-    let moments = lobes.moment_count();
+    let moments = LobeKind::moments(lobe);
     for (moment, values) in values.iter().enumerate().take(moments) {
         let (sum, tails) = sum(simd, values);
         whole_sums.sums[moment] = (sum * area).to_array();

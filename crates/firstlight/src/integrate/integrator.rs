@@ -463,7 +463,7 @@ impl AreaLightIntegrator {
     fn integrate_panels(&mut self, level: Level, task: &LightTask) {
         let Self { frames, masks, kept, panels, panel_sums, .. } = self;
         let light = task.occluded_light(masks);
-        let moments = if task.lobe.is_none() { 1 } else { MOMENTS };
+        let moments = LobeKind::moments(task.lobe);
         panel_sums.clear();
         dispatch_wide!(level, simd => {
             for some in panels.chunks(LANES) {

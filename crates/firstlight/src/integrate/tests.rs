@@ -7,7 +7,7 @@ use fearless_simd::Level;
 use super::light_frame::{FlatLight, LightFrame, Linear, Outline};
 use super::*;
 use crate::color::{Display, DisplaySteps, Rgb};
-use crate::material::{BlinnPhongLobe, Bsdf, Colors, Lobe, Moments, PhongLobe, ShadingPoint};
+use crate::material::{BlinnPhongLobe, Bsdf, Colors, Lobe, Moments, PerMoment, PhongLobe, ShadingPoint};
 use crate::math::{DVec3, ErrorBound, Vec3};
 use crate::shape::{Parallelogram, Sphere, SphereUv};
 use crate::visibility::Visibility;
@@ -43,7 +43,7 @@ impl Random {
 
 /// A grey material with a lobe.
 fn gray(lobe: Lobe) -> Bsdf {
-    Bsdf { colors: Colors::default().map(|_| Rgb::gray(0.5)), ambient: Rgb::BLACK, emission: Rgb::BLACK, lobe }
+    Bsdf { colors: Colors::default().map(|_| Rgb::gray(0.5)), ambient: Rgb::BLACK, lobe }
 }
 
 /// A light and a point near the origin, and things between them.
@@ -158,10 +158,10 @@ fn brute(case: &Case, n: usize) -> Moments {
             }
             let cos_i = height / distance;
             diffuse += weight * f64::from(cos_i);
-            specular += weight * f64::from(at.bsdf.lobe.eval(cos_i, at.ns.dot(at.wo), at.wo.dot(l) / distance));
+            specular += weight * f64::from(at.bsdf.lobe.eval(cos_i, at.ns.dot(at.wo), at.wo.dot(l) / distance).0[1]);
         }
     }
-    Moments::bounds(diffuse as f32, specular as f32)
+    PerMoment([diffuse as f32, specular as f32, 0.0])
 }
 
 /// The integration of a light at one point, to the accuracy of a pixel.
@@ -348,9 +348,9 @@ impl BallCase {
             }
             let [cos_i, cos_o, cos_io] = [height / distance, ns.dot(wo), wo.dot(l) / distance].map(|v| v as f32);
             diffuse += weight * f64::from(cos_i);
-            specular += weight * f64::from(self.point.bsdf.lobe.eval(cos_i, cos_o, cos_io));
+            specular += weight * f64::from(self.point.bsdf.lobe.eval(cos_i, cos_o, cos_io).0[1]);
         }
-        Moments::bounds(diffuse as f32, specular as f32)
+        PerMoment([diffuse as f32, specular as f32, 0.0])
     }
 
     fn batched(&self, steps: &DisplaySteps) -> Moments {

@@ -119,7 +119,7 @@ pub(crate) struct Tolerance {
 /// The constants that decide an error.
 pub(crate) const TOLERANCE: Tolerance = Tolerance {
     point: 0.15,
-    by_chance: 3.2,
+    by_chance: 3.1,
     least_share: 1.0 / 16.0,
     part: 0.5,
     fit_cut: 0.1,
@@ -185,6 +185,7 @@ pub(crate) struct Weight(pub [f32; MOMENTS]);
 impl Weight {
     /// For light of colours `worth` times the moments, within the total `value`, and an allowed error in display steps.
     /// `least`: see [`DisplaySteps::slope`].
+    #[inline(always)]
     pub fn new(steps: &DisplaySteps, value: Rgb, worth: &Colors, allowed: f32, least: f32) -> Weight {
         let used = if value.r == value.g && value.g == value.b {
             [steps.slope(value.r, least) / allowed; 3]

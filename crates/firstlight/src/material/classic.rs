@@ -1,6 +1,6 @@
 //! Materials of a diffuse part and a highlight that is a power of a cosine.
 
-use super::{BlinnPhongLobe, Colors, Lobe, LobeKind, PerMoment, PhongLobe};
+use super::{Ambient, BlinnPhongLobe, Bsdf, Colors, Lobe, LobeKind, PerMoment, PhongLobe, ViewGeometry};
 use crate::color::Rgb;
 use crate::context::CompileContext;
 use crate::describe::{ColorParam, NumberParam};
@@ -54,13 +54,14 @@ impl Classic {
         }
     }
 
-    /// The colours of the moments, the answer to ambient light, and the highlight.
+    /// In numbers; `ambient`: see [`Material::evaluate`](super::Material).
     #[inline(always)]
     pub(super) fn evaluate(
         &self,
         color: impl Fn(&Param<Rgb>) -> Rgb,
         number: impl Fn(&Param<f32>) -> f32,
-    ) -> (Colors, Rgb, Lobe) {
+        ambient: Option<(&Ambient, ViewGeometry)>,
+    ) -> Bsdf {
         let diffuse = color(&self.diffuse);
         // The same texture in both is looked up once: config 11 has it so everywhere
         let specular = match (self.specular.texture, self.diffuse.texture) {
@@ -73,11 +74,13 @@ impl Classic {
             let shininess = number(&self.shininess).clamp(0.0, MAX_SHININESS);
             match self.lobe {
                 LobeKind::Phong => Lobe::Phong(PhongLobe::new(shininess)),
-                LobeKind::BlinnPhong => Lobe::BlinnPhong(BlinnPhongLobe::new(shininess)),
+                _ => Lobe::BlinnPhong(BlinnPhongLobe::new(shininess)),
             }
         };
-        let ambient = self.ambient.as_ref().map_or(diffuse, color);
-        (PerMoment([diffuse, specular]), ambient, lobe)
+        let answer = self.ambient.as_ref().map_or(diffuse, color);
+        let ambient = ambient.map_or(answer, |(ambient, view)| ambient.answer(&view, answer, Rgb::BLACK));
+        let colors = PerMoment([diffuse, specular, Rgb::BLACK]);
+        Bsdf { colors, ambient, lobe }
     }
 
     /// The textures of its colours, and of its numbers.
@@ -91,6 +94,6 @@ impl Classic {
     pub(super) fn contrast(&self, contrast: impl Fn(&Param<Rgb>) -> Option<Rgb>) -> Option<(Colors, Rgb)> {
         let [diffuse, specular] = [contrast(&self.diffuse)?, contrast(&self.specular)?];
         let ambient = self.ambient.as_ref().map_or(Some(diffuse), contrast)?;
-        self.shininess.texture.is_none().then_some((PerMoment([diffuse, specular]), ambient))
+        self.shininess.texture.is_none().then_some((PerMoment([diffuse, specular, Rgb::BLACK]), ambient))
     }
 }

@@ -3,10 +3,9 @@
 use super::{Alpha, AlphaMode};
 use crate::color::Rgb;
 use crate::context::CompileContext;
-use crate::describe::{Channel, ColorParam, NumberParam, table};
+use crate::describe::{ColorParam, NumberParam, table};
 use crate::ids::TextureId;
-use crate::shape::SurfaceInteraction;
-use crate::texture::{Param, Params, Texture};
+use crate::texture::{Param, Params};
 
 /// The largest factor of `emissive`.
 const MAX_EMISSION: f64 = 1e6;
@@ -44,7 +43,7 @@ pub struct MaterialCommon {
 
 impl MaterialCommonDesc {
     pub(super) fn compile(&self, cx: &mut CompileContext, params: &mut impl Params) -> MaterialCommon {
-        let mut emissive = params.color(cx, "emissive", &self.emissive);
+        let mut emissive = params.radiance(cx, "emissive", &self.emissive);
         cx.between("emissive_strength", self.emissive_strength, 0.0, MAX_EMISSION, None);
         emissive.factor = emissive.factor * self.emissive_strength as f32;
         let alpha = self.compile_alpha(cx, params);
@@ -76,16 +75,8 @@ impl MaterialCommonDesc {
 
 impl MaterialCommon {
     /// That of materials that say nothing of it.
-    pub(super) const NONE: MaterialCommon = MaterialCommon {
-        emissive: Param { texture: None, factor: Rgb::BLACK, channel: Channel::R, bias: 0.0 },
-        alpha: None,
-        single_sided: false,
-    };
-
-    /// The radiance that it emits at a surface.
-    #[inline]
-    pub(super) fn emission(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Rgb {
-        self.emissive.color(si, textures)
+    pub(super) fn none() -> MaterialCommon {
+        MaterialCommon { emissive: Param::constant(Rgb::BLACK), alpha: None, single_sided: false }
     }
 
     /// The textures of its parameters.

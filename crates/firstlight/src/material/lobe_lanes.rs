@@ -1,52 +1,54 @@
-//! The lobes of sixteen points of one kind, each with its own parameters in its lane.
+//! The lobes of sixteen points of one kind, each with its own numbers in its lane.
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{BlinnPhongLobe, Lobe, LobeKind, MOMENTS, PhongLobe};
+use super::{BlinnPhongLobe, GgxLobe, LOBE_NUMBERS, Lobe, LobeKind, MOMENTS, PhongLobe};
 use crate::math::{ExponentLanes, LANES};
 
 /// Lobes of one kind, lane by lane.
 #[derive(Clone, Debug)]
-pub(crate) struct LobeLanes {
-    /// `None`: no highlight.
-    kind: Option<LobeKind>,
-    /// The powers that the kind raises its cosine to.
-    powers: ExponentLanes,
+pub(crate) enum LobeLanes {
+    /// No highlight.
+    None,
+    /// The exponents.
+    Phong(ExponentLanes),
+    /// Half the exponents.
+    BlinnPhong(ExponentLanes),
+    /// Alpha, and what is transmitted less at grazing angles.
+    Ggx([[f32; LANES]; LOBE_NUMBERS]),
 }
 
 impl LobeLanes {
     /// One lobe in all lanes.
     #[inline(always)]
     pub fn of(lobe: &Lobe) -> LobeLanes {
-        LobeLanes::new(lobe.kind(), [lobe.shininess(); LANES])
+        LobeLanes::new(lobe.kind(), lobe.numbers().map(|number| [number; LANES]))
     }
 
-    /// Lobes with these exponents.
+    /// Lobes with these [numbers](Lobe::numbers).
     #[inline]
-    pub fn new(kind: Option<LobeKind>, shininess: [f32; LANES]) -> LobeLanes {
-        let power = |shininess: f32| match kind {
-            None => 0.0,
-            Some(LobeKind::Phong) => shininess,
-            Some(LobeKind::BlinnPhong) => 0.5 * shininess,
-        };
-        LobeLanes { kind, powers: ExponentLanes::new(shininess.map(power)) }
-    }
-
-    /// How many moments are not always 0.
-    #[inline(always)]
-    pub fn moment_count(&self) -> usize {
-        if self.kind.is_none() { 1 } else { MOMENTS }
+    pub fn new(kind: Option<LobeKind>, numbers: [[f32; LANES]; LOBE_NUMBERS]) -> LobeLanes {
+        match kind {
+            None => LobeLanes::None,
+            Some(LobeKind::Phong) => LobeLanes::Phong(ExponentLanes::new(numbers[0])),
+            Some(LobeKind::BlinnPhong) => LobeLanes::BlinnPhong(ExponentLanes::new(numbers[0].map(|s| 0.5 * s))),
+            Some(LobeKind::Ggx) => LobeLanes::Ggx(numbers),
+        }
     }
 
     /// [`Lobe::sharpness`], lane by lane.
     #[inline(always)]
     pub fn sharpness<S: Simd>(&self, cos_o: f32x16<S>) -> f32x16<S> {
         let simd = cos_o.token();
-        let powers = f32x16::simd_from(simd, *self.powers.values());
-        match self.kind {
-            None => simd.splat_f32x16(0.0),
-            Some(LobeKind::Phong) => powers * 0.5,
-            Some(LobeKind::BlinnPhong) => powers * 0.25 / (cos_o * cos_o).max(simd.splat_f32x16(0.01)),
+        let slow = (cos_o * cos_o).max(simd.splat_f32x16(0.01));
+        match self {
+            LobeLanes::None => simd.splat_f32x16(0.0),
+            LobeLanes::Phong(powers) => f32x16::simd_from(simd, *powers.values()) * 0.5,
+            LobeLanes::BlinnPhong(powers) => f32x16::simd_from(simd, *powers.values()) * 0.25 / slow,
+            LobeLanes::Ggx([alpha, _]) => {
+                let alpha = f32x16::simd_from(simd, *alpha);
+                0.5 / (alpha * alpha) / slow
+            }
         }
     }
 
@@ -60,11 +62,16 @@ impl LobeLanes {
         weight: [f32x16<S>; N],
     ) -> [[f32x16<S>; N]; MOMENTS] {
         let times = |v: [f32x16<S>; N]| std::array::from_fn(|i| v[i] * weight[i]);
-        let highlight = match self.kind {
-            None => return [times(cos_i), [cos_o.token().splat_f32x16(0.0); N]],
-            Some(LobeKind::Phong) => PhongLobe::eval_lanes(&self.powers, cos_i, cos_o, cos_io),
-            Some(LobeKind::BlinnPhong) => BlinnPhongLobe::eval_lanes(&self.powers, cos_i, cos_o, cos_io),
+        let zero = [cos_o.token().splat_f32x16(0.0); N];
+        let highlight = match self {
+            LobeLanes::None => return [times(cos_i), zero, zero],
+            LobeLanes::Ggx(numbers) => {
+                let numbers = numbers.map(|number| f32x16::simd_from(cos_o.token(), number));
+                return GgxLobe::eval_lanes(numbers, cos_i, cos_o, cos_io).map(times);
+            }
+            LobeLanes::Phong(powers) => PhongLobe::eval_lanes(powers, cos_i, cos_o, cos_io),
+            LobeLanes::BlinnPhong(powers) => BlinnPhongLobe::eval_lanes(powers, cos_i, cos_o, cos_io),
         };
-        [times(cos_i), times(highlight)]
+        [times(cos_i), times(highlight), zero]
     }
 }

@@ -1,26 +1,38 @@
 //! Materials: how a surface turns the light that arrives into the light that leaves.
 
 mod alpha;
+mod ambient;
 mod blinn_phong;
 mod bsdf;
 mod classic;
 mod common;
+mod ggx;
 mod highlight;
 mod lobe_lanes;
+mod metallic_roughness;
 mod moments;
 mod phong;
 mod shading_point;
+mod unlit;
 
 pub use alpha::{Alpha, AlphaMode};
+pub(crate) use ambient::ViewGeometry;
+pub use ambient::{Ambient, AmbientDesc, AmbientGradientDesc};
 pub use blinn_phong::{BlinnPhongDesc, BlinnPhongLobe};
+pub(crate) use bsdf::LOBE_NUMBERS;
 pub use bsdf::{Bsdf, Lobe, LobeKind};
 pub use classic::Classic;
 pub use common::{MaterialCommon, MaterialCommonDesc};
+pub use ggx::GgxLobe;
 pub(crate) use highlight::Highlight;
 pub(crate) use lobe_lanes::LobeLanes;
-pub(crate) use moments::{Colors, MOMENTS, Moments, PerMoment};
+pub use metallic_roughness::{MetallicRoughness, MetallicRoughnessDesc};
+pub(crate) use moments::{Colors, LightTerm, MOMENTS, Moments, PARTS, PerMoment};
 pub use phong::{PhongDesc, PhongLobe};
 pub(crate) use shading_point::ShadingPoint;
+pub use unlit::UnlitDesc;
+
+use arrayvec::ArrayVec;
 
 use crate::color::Rgb;
 use crate::context::CompileContext;
@@ -36,6 +48,10 @@ family! {
         Phong(PhongDesc) = "phong",
         /// `[material.blinn-phong.NAME]`
         BlinnPhong(BlinnPhongDesc) = "blinn-phong",
+        /// `[material.metallic-roughness.NAME]`
+        MetallicRoughness(MetallicRoughnessDesc) = "metallic-roughness",
+        /// `[material.unlit.NAME]`
+        Unlit(UnlitDesc) = "unlit",
     }
 }
 
@@ -44,6 +60,8 @@ impl MaterialDesc {
         match self {
             MaterialDesc::Phong(desc) => desc.compile(cx, params),
             MaterialDesc::BlinnPhong(desc) => desc.compile(cx, params),
+            MaterialDesc::MetallicRoughness(desc) => desc.compile(cx, params),
+            MaterialDesc::Unlit(desc) => desc.compile(cx, params),
         }
     }
 }
@@ -62,47 +80,99 @@ pub struct Material {
 pub enum Reflection {
     /// `phong` and `blinn-phong`.
     Classic(Classic),
+    /// `metallic-roughness`.
+    MetallicRoughness(MetallicRoughness),
+    /// `unlit`: the radiance.
+    Unlit(Param<Rgb>),
 }
 
 impl Material {
     /// That of shapes that name none.
     pub(crate) fn matte() -> Material {
-        Material { reflection: Reflection::Classic(Classic::matte()), common: MaterialCommon::NONE }
+        Material { reflection: Reflection::Classic(Classic::matte()), common: MaterialCommon::none() }
     }
 
-    /// The material in numbers at one surface.
-    #[inline]
-    pub fn bsdf(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Bsdf {
-        let mut bsdf =
-            self.evaluate(|param| param.color(si, textures) * si.color, |param| param.number(si, textures, 1.0));
-        bsdf.emission = self.common.emission(si, textures);
-        bsdf
-    }
-
-    /// The same on any surface, if it has no texture.
-    pub(crate) fn plain_bsdf(&self) -> Option<Bsdf> {
-        let is_plain = self.textures().all(|texture| texture.is_none());
-        is_plain.then(|| {
-            let bsdf = self.evaluate(|param| param.factor, |param| param.factor);
-            Bsdf { emission: self.common.emissive.factor, ..bsdf }
-        })
-    }
-
-    /// All but the emission, from the values of its parameters.
+    /// The material in numbers at one surface, under such ambient light.
     #[inline(always)]
-    fn evaluate(&self, color: impl Fn(&Param<Rgb>) -> Rgb, number: impl Fn(&Param<f32>) -> f32) -> Bsdf {
-        let (colors, ambient, lobe) = match &self.reflection {
-            Reflection::Classic(classic) => classic.evaluate(color, number),
+    pub fn bsdf(&self, si: &SurfaceInteraction, textures: &[Texture], ambient: &Ambient) -> Bsdf {
+        let ambient = self.varies_with_view(ambient).then_some((ambient, ViewGeometry { ns: si.ns, wo: si.wo }));
+        let color = |param: &Param<Rgb>| param.color(si, textures) * si.color;
+        self.evaluate(color, |param| param.number(si, textures, 1.0), ambient)
+    }
+
+    /// The same on any surface, if it is the same on all.
+    pub(crate) fn plain_bsdf(&self, ambient: &Ambient) -> Option<Bsdf> {
+        let is_plain = self.may_be_even(ambient) && self.textures().all(|texture| texture.is_none());
+        is_plain.then(|| self.evaluate(|param| param.factor, |param| param.factor, None))
+    }
+
+    /// The material in numbers, from the values of its parameters. `ambient`: the light to which the answer varies with
+    /// the directions at the surface, if it does.
+    #[inline(always)]
+    fn evaluate(
+        &self,
+        color: impl Fn(&Param<Rgb>) -> Rgb,
+        number: impl Fn(&Param<f32>) -> f32,
+        ambient: Option<(&Ambient, ViewGeometry)>,
+    ) -> Bsdf {
+        match &self.reflection {
+            Reflection::Classic(classic) => classic.evaluate(color, number, ambient),
+            Reflection::MetallicRoughness(material) => material.evaluate(color, number, ambient),
+            Reflection::Unlit(_) => unlit::UNLIT,
+        }
+    }
+
+    /// The radiance that it emits at a surface.
+    #[inline]
+    pub fn emission(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Rgb {
+        if !self.is_emissive() {
+            return Rgb::BLACK;
+        }
+        let emissive = self.common.emissive.color(si, textures);
+        match &self.reflection {
+            Reflection::Unlit(radiance) => radiance.color(si, textures) * si.color + emissive,
+            _ => emissive,
+        }
+    }
+
+    /// Whether it may emit light.
+    pub(crate) fn is_emissive(&self) -> bool {
+        matches!(self.reflection, Reflection::Unlit(_)) || !self.common.emissive.factor.is_black()
+    }
+
+    /// Whether it may be the same all over a surface without textures, and emits nothing.
+    fn may_be_even(&self, ambient: &Ambient) -> bool {
+        !self.varies_with_view(ambient) && !self.is_emissive()
+    }
+
+    /// Whether its answer to ambient light depends on the normal or on the viewer.
+    fn varies_with_view(&self, ambient: &Ambient) -> bool {
+        match &self.reflection {
+            Reflection::Classic(_) => !ambient.is_uniform(),
+            Reflection::MetallicRoughness(_) => !ambient.is_black(),
+            Reflection::Unlit(_) => false,
+        }
+    }
+
+    /// The colour of the base: what a diffuse surface reflects, a metal's own colour, what an unlit surface shows.
+    pub(crate) fn albedo(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Rgb {
+        let color = match &self.reflection {
+            Reflection::Classic(classic) => &classic.diffuse,
+            Reflection::MetallicRoughness(material) => &material.base_color,
+            Reflection::Unlit(radiance) => radiance,
         };
-        Bsdf { colors, ambient, emission: Rgb::BLACK, lobe }
+        color.color(si, textures) * si.color
     }
 
     /// The textures of its parameters, those of its common ones first.
     fn textures(&self) -> impl Iterator<Item = Option<TextureId>> {
-        let reflection = match &self.reflection {
-            Reflection::Classic(classic) => classic.textures(),
-        };
-        self.common.textures().into_iter().chain(reflection)
+        let mut all = ArrayVec::<_, 8>::from_iter(self.common.textures());
+        match &self.reflection {
+            Reflection::Classic(classic) => all.extend(classic.textures()),
+            Reflection::MetallicRoughness(material) => all.extend(material.textures()),
+            Reflection::Unlit(radiance) => all.push(radiance.texture),
+        }
+        all.into_iter()
     }
 
     /// How far its colours differ all over it, and that of its answer to ambient light, if they are the means over the
@@ -112,16 +182,21 @@ impl Material {
             None => Some(Rgb::BLACK),
             Some(id) => Some(textures[id.index()].contrast()? * param.factor),
         };
-        if self.common.textures().into_iter().any(|texture| texture.is_some()) {
+        if self.is_emissive() {
             return None;
         }
         match &self.reflection {
             Reflection::Classic(classic) => classic.contrast(contrast),
+            Reflection::MetallicRoughness(material) => material.contrast(contrast),
+            Reflection::Unlit(_) => None,
         }
     }
 
     /// Whether it is the same all within a step of the footprint of a surface.
-    pub(crate) fn is_even(&self, si: &SurfaceInteraction, textures: &[Texture]) -> bool {
+    pub(crate) fn is_even(&self, si: &SurfaceInteraction, textures: &[Texture], ambient: &Ambient) -> bool {
+        if !self.may_be_even(ambient) {
+            return false;
+        }
         let mut before = None;
         self.textures().flatten().all(|id| {
             // Textures of several parameters in a row are looked at once

@@ -5,8 +5,8 @@ use std::ops::{Add, AddAssign, Mul};
 
 use crate::color::Rgb;
 
-/// How many there are: the cosine, and the highlight.
-pub(crate) const MOMENTS: usize = 2;
+/// How many there are, at most: the cosine, or what of it is transmitted, and the parts of the highlight.
+pub(crate) const MOMENTS: usize = 3;
 
 /// Something of each moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -18,11 +18,46 @@ pub(crate) type Moments = PerMoment<f32>;
 /// What each moment is worth.
 pub(crate) type Colors = PerMoment<Rgb>;
 
+/// How many parts the light that a surface reflects has: diffuse and specular.
+pub(crate) const PARTS: usize = 2;
+
+/// The light that a surface reflects: diffuse and specular.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct LightTerm(pub [Rgb; PARTS]);
+
+impl LightTerm {
+    pub const BLACK: LightTerm = LightTerm([Rgb::BLACK; PARTS]);
+
+    #[inline(always)]
+    pub fn sum(self) -> Rgb {
+        let [diffuse, specular] = self.0;
+        diffuse + specular
+    }
+}
+
+impl AddAssign for LightTerm {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        for (sum, other) in self.0.iter_mut().zip(other.0) {
+            *sum += other;
+        }
+    }
+}
+
+impl Mul<f32> for LightTerm {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, times: f32) -> Self {
+        LightTerm(self.0.map(|part| part * times))
+    }
+}
+
 impl<T: Copy> PerMoment<T> {
     /// Bounds: of what is as wide as the cosine, and of highlights.
     #[inline(always)]
     pub fn bounds(wide: T, narrow: T) -> Self {
-        PerMoment([wide, narrow])
+        PerMoment([wide, narrow, narrow])
     }
 
     /// The cosine's.
@@ -79,6 +114,19 @@ impl Colors {
     #[inline(always)]
     pub fn each(self, moments: &Moments) -> Colors {
         self.zip(*moments, |color, moment| color * moment)
+    }
+
+    /// The light that is reflected of so much of each moment: the diffuse part is that of the first.
+    #[inline(always)]
+    pub fn reflected(self, moments: &Moments) -> LightTerm {
+        self.each(moments).term()
+    }
+
+    /// The parts of light of which each moment is so much.
+    #[inline(always)]
+    pub fn term(self) -> LightTerm {
+        let [diffuse, highlight, rest @ ..] = self.0;
+        LightTerm([diffuse, rest.into_iter().fold(highlight, |sum, part| sum + part)])
     }
 
     /// Adds what moments make.

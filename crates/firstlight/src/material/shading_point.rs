@@ -1,6 +1,6 @@
 //! A point of a surface, as lights need it.
 
-use super::Bsdf;
+use super::{Ambient, Bsdf};
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
 use crate::math::{ErrorBound, Facet, Vec3};
@@ -69,7 +69,7 @@ impl ShadingPoint {
 
     /// Where a ray meets a surface, under `ambient` light.
     #[inline(always)]
-    pub fn of(si: &SurfaceInteraction, bsdf: &Bsdf, ambient: Rgb) -> ShadingPoint {
+    pub fn of(si: &SurfaceInteraction, bsdf: &Bsdf, ambient: &Ambient) -> ShadingPoint {
         let SurfaceInteraction { lit_from, error, horizon, ng, facet, ns, wo, surface, receives_shadow, .. } = *si;
         let base = bsdf.base(ambient);
         let point = ShadingPoint::new(lit_from, error, ns, wo, bsdf);

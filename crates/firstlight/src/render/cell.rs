@@ -32,12 +32,12 @@ use super::visible_shape::{MeanBsdf, VisibleShape};
 use crate::color::Rgb;
 use crate::film::FilmTile;
 use crate::film::hits::{PixelHits, PixelRays};
-use crate::film::resolve::{LightTerm, PixelTerms, ScaledTerm, Term, TermSums};
+use crate::film::resolve::{PixelTerms, ScaledTerm, Term, TermSums};
 use crate::film::tile::Tile;
 use crate::film::{AaMode, Heat};
 use crate::image::Buffer;
 use crate::integrate::TOLERANCE;
-use crate::material::{Bsdf, Colors, MOMENTS, Moments};
+use crate::material::{Bsdf, Colors, LightTerm, Moments, PARTS};
 use crate::math::Ray;
 use crate::scene::{LayerStack, Scene};
 use crate::visibility::Visibility;
@@ -308,7 +308,9 @@ impl<'a> CellRenderer<'a> {
             let block = block.filter(|_| mean.is_constant);
             for light in 0..lights {
                 match block.and_then(|block| self.grid.arriving(&block, light as usize, at)) {
-                    Some(moments) => *self.term(fragment as u32, light) += mean.bsdf.colors.each(&(moments * count)),
+                    Some(moments) => {
+                        *self.term(fragment as u32, light) += mean.bsdf.colors.reflected(&(moments * count))
+                    }
                     None => {
                         self.queues[ShadingRate::Quadrant as usize].push(FragmentQuery::new(fragment as u32, light));
                     }
@@ -322,17 +324,14 @@ impl<'a> CellRenderer<'a> {
     fn sum_row(&mut self, block: &SurfaceBlock, at: [u32; 2], pixels: usize, bsdf: &Bsdf) {
         let first = self.index(at);
         self.sums.begin(first..first + pixels, Rgb::BLACK, 1.0);
-        if bsdf.emission != Rgb::BLACK {
-            self.sums.add(first, Term::Emission, Rgb::WHITE, iter::repeat_n(bsdf.emission, pixels));
-        }
-        let ambient = iter::repeat_n(bsdf.ambient_light(self.scene.ambient), pixels);
+        let ambient = iter::repeat_n(bsdf.base(&self.scene.ambient), pixels);
         self.sums.add(first, Term::Ambient, Rgb::WHITE, ambient);
         for light in 0..self.few {
             let scale = self.lights.scale(light);
             let row = self.grid.row(block, light, at, pixels);
-            for moment in 0..MOMENTS {
-                let part = |arriving: &Moments| bsdf.colors.each(arriving).0[moment];
-                self.sums.add(first, Term::Light(Some(light as u32), moment), scale, row.iter().map(part));
+            for part in 0..PARTS {
+                let value = |arriving: &Moments| bsdf.colors.reflected(arriving).0[part];
+                self.sums.add(first, Term::Light(Some(light as u32), part), scale, row.iter().map(value));
             }
         }
     }
@@ -386,7 +385,7 @@ impl<'a> CellRenderer<'a> {
                 for (point, estimate) in of.range(rate).zip(own) {
                     let rays = self.fragments.part(rate, point).0 as f32;
                     let colors = self.fragments.points_of(rate)[point].bsdf.colors;
-                    sum += colors.each(&(estimate.moments * rays));
+                    sum += colors.reflected(&(estimate.moments * rays));
                 }
                 *self.term(fragment, light) += sum;
                 continue;
@@ -447,8 +446,8 @@ impl<'a> CellRenderer<'a> {
         let bend = part * estimate.most;
         let bsdf = &fragment.mean.bsdf;
         let colors = self.lights.scale(light as usize) * bsdf.colors;
-        let value = colors.onto(bsdf.base(self.scene.ambient), &estimate.moments);
-        self.lights.steps(value, colors.of(&Moments::bounds(bend, bend)))
+        let value = colors.onto(bsdf.base(&self.scene.ambient), &estimate.moments);
+        self.lights.steps(value, colors.of(&Moments::bounds(bend, bend * bsdf.lobe.most())))
     }
 
     /// Whether a light varies little enough over the quadrants of a fragment.
@@ -475,7 +474,7 @@ impl<'a> CellRenderer<'a> {
         let bsdf = &fragment.mean.bsdf;
         let scale = self.lights.scale(light as usize);
         let colors = scale * bsdf.colors;
-        let value = colors.onto(bsdf.base(self.scene.ambient), &most);
+        let value = colors.onto(bsdf.base(&self.scene.ambient), &most);
         let sets_in = estimates.iter().any(|estimate| estimate.moments == Moments::ZERO);
         let allowed = if sets_in { TOLERANCE.spread * TOLERANCE.bends_at_once } else { TOLERANCE.spread };
         let weight = fragment.share * (self.few as f32).sqrt();
@@ -518,7 +517,7 @@ impl<'a> CellRenderer<'a> {
                 let mut pooled = None;
                 for (point, estimate) in self.fragments.rays[rays.clone()].iter().zip(own) {
                     if estimate.moments.is_known() {
-                        sum += point.bsdf.colors.each(&estimate.moments);
+                        sum += point.bsdf.colors.reflected(&estimate.moments);
                         continue;
                     }
                     let (salt, light) = (salt(self.at(pixel), surface), *light as usize);
@@ -555,7 +554,7 @@ impl<'a> CellRenderer<'a> {
     fn add_ambient(&mut self) {
         for Fragment { pixel, mean, count, .. } in &self.fragments.all {
             let pixel = &mut self.pixels[*pixel as usize];
-            pixel.terms.see(self.scene, &mean.bsdf, *count);
+            pixel.terms.ambient += mean.bsdf.base(&self.scene.ambient) * *count as f32;
         }
     }
 

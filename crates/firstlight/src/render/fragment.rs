@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::visible_shape::{MeanBsdf, VisibleShape};
 use crate::ids::SurfaceId;
 use crate::integrate::TOLERANCE;
-use crate::material::{Bsdf, Colors, Material, ShadingPoint};
+use crate::material::{Bsdf, Colors, ShadingPoint};
 use crate::math::{DVec3, Ray, Vec3};
 use crate::scene::Scene;
 
@@ -86,7 +86,7 @@ impl Fragment {
 impl Fragments {
     pub fn new(scene: &Scene, by_means: bool) -> Self {
         Fragments {
-            plain: scene.materials.iter().map(Material::plain_bsdf).collect(),
+            plain: scene.materials.iter().map(|material| material.plain_bsdf(&scene.ambient)).collect(),
             by_means,
             all: Vec::new(),
             rays: Vec::new(),
@@ -367,7 +367,7 @@ fn center_in_trees<'a>(
     let layers = scene.layers_of(&ray, first.surface);
     let mut center = hit.into_iter().chain(layers).find_map(|hit| {
         let si = scene.local_surface(&ray, &hit, &differential);
-        let center = ShadingPoint::of(&si, bsdf, scene.ambient);
+        let center = ShadingPoint::of(&si, bsdf, &scene.ambient);
         is_one_surface(&center, first).then_some(center)
     })?;
     let mut normals = Vec3::ZERO;

@@ -251,7 +251,7 @@ impl LightingGrid {
         }
         // The arc, not the chord
         let (reach, turn) = (reach * 1.0625, turn * 1.0625);
-        let (bsdf, base) = (block.bsdf, block.bsdf.base(lights.scene.ambient));
+        let (bsdf, base) = (block.bsdf, block.bsdf.base(&lights.scene.ambient));
         ShadingPoint { reach, turn, bsdf, base, most_motion: 1.0, ..*center }
     }
 
@@ -266,7 +266,7 @@ impl LightingGrid {
         center: &LightEstimate,
     ) -> bool {
         let colors = lights.scale(light as usize) * block.bsdf.colors;
-        let base = block.bsdf.base(lights.scene.ambient);
+        let base = block.bsdf.base(&lights.scene.ambient);
         let geometry = &lights.scene.geometry;
         let is_behind = (geometry.has_trees() || geometry.layers.is_some()) && center.visibility == Visibility::Partial;
         // Where silhouettes move far, the edge of a penumbra may run between the nodes

@@ -5,9 +5,9 @@ use std::ops::ControlFlow;
 
 use super::{Counts, QUESTION_EVERY};
 use crate::film::hits::camera_ray;
-use crate::film::resolve::{LightTerm, PixelTerms, ScaledTerm, TermSums};
+use crate::film::resolve::{PixelTerms, ScaledTerm, TermSums};
 use crate::ids::LightId;
-use crate::material::{Bsdf, MOMENTS, Moments, PerMoment, ShadingPoint};
+use crate::material::{Bsdf, LightTerm, MOMENTS, Moments, PerMoment, ShadingPoint};
 use crate::math::{LaneSum, Ray};
 use crate::scene::{Hit, LayerStack, Scene, TracedHit};
 use crate::shape::{RayDifferential, SurfaceInteraction};
@@ -124,18 +124,17 @@ impl PixelSum {
     #[inline(always)]
     fn see_surface(&mut self, scene: &Scene, si: &SurfaceInteraction, weight: f32) -> ShadingPoint {
         // Evaluate the textures of the material
-        let mut bsdf = scene.materials[si.material.index()].bsdf(si, &scene.textures);
-        if weight != 1.0 {
-            bsdf = bsdf.weighted(weight);
-        }
-        self.terms.see(scene, &bsdf, 1);
-        ShadingPoint::of(si, &bsdf, scene.ambient)
+        let bsdf = scene.bsdf(si).weighted(weight);
+        self.terms.emission.add(scene.emission(si), weight.into());
+        let point = ShadingPoint::of(si, &bsdf, &scene.ambient);
+        self.terms.ambient += point.base;
+        point
     }
 
     /// Adds the moments of light `index` at a surface: the totals of [`LobeSums`].
     #[inline(always)]
     pub fn light(&mut self, index: usize, bsdf: &Bsdf, moments: &Moments) {
-        self.lights[index] += bsdf.colors.each(moments);
+        self.lights[index] += bsdf.colors.reflected(moments);
     }
 
     /// Adds all lights at a shading point.

@@ -18,11 +18,10 @@ use variance::VarianceEstimate;
 use super::Counts;
 use super::direct::DirectLighting;
 use crate::color::Rgb;
-use crate::film::resolve::LightTerm;
 use crate::ids::SurfaceId;
 use crate::integrate::TOLERANCE;
 use crate::light::{SERIES, mix};
-use crate::material::{MOMENTS, Moments, ShadingPoint};
+use crate::material::{LightTerm, MOMENTS, Moments, ShadingPoint};
 use crate::visibility::{ShadowView, Visibility};
 
 /// So many samples of all rays prove that all of the light is hidden: the display curve is steepest at black.
@@ -68,9 +67,11 @@ pub(crate) struct PooledVisibility {
     value: Rgb,
 }
 
-/// A number that differs between neighbouring pixels, and between surfaces in a pixel.
-pub(crate) fn salt([i, j]: [u32; 2], surface: SurfaceId) -> u32 {
-    i ^ j.rotate_left(16) ^ surface.index() as u32
+/// A number that decides which series of points a pixel samples: different in the four pixels of a block of two by two,
+/// so that their errors differ, and without a pattern from block to block, which errors would show.
+pub(crate) fn salt([i, j]: [u32; 2], surface: SurfaceId) -> u64 {
+    let block = mix(mix(u64::from(i / 2) << 32 | u64::from(j / 2)) ^ surface.index() as u64);
+    block ^ u64::from((i & 1) << 2 | (j & 1) << 3)
 }
 
 impl PooledVisibility {
@@ -81,7 +82,7 @@ impl PooledVisibility {
         scale: Rgb,
         rays: usize,
         share: f32,
-        salt: u32,
+        salt: u64,
         others: Rgb,
         sampled_lights: usize,
     ) -> Self {
@@ -93,8 +94,7 @@ impl PooledVisibility {
             each: share / rays as f32,
             others,
             sampled_lights,
-            // Without a pattern: the errors of neighbouring pixels would make one too
-            series: mix(salt.into()) as usize % SERIES,
+            series: salt as usize % SERIES,
             pending: Vec::new(),
             receivers: Vec::new(),
             rays: 0,
@@ -150,7 +150,7 @@ impl PooledVisibility {
     }
 
     fn receive(&mut self, point: &ShadingPoint, moments: &Moments, visible_fraction: Option<f32>) {
-        self.sum.terms += point.bsdf.colors.each(moments);
+        self.sum.terms += point.bsdf.colors.reflected(moments);
         self.sum.moments += *moments;
         self.value += (self.scale * point.bsdf.colors).of(moments);
         if let Some(visible) = visible_fraction {
@@ -191,7 +191,7 @@ impl PooledVisibility {
     pub fn of_points(
         light: usize,
         points: &[ShadingPoint],
-        salt: u32,
+        salt: u64,
         lights: &mut DirectLighting,
         counts: &mut Counts,
     ) -> PooledLight {

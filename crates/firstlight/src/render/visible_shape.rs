@@ -62,7 +62,6 @@ impl MeanBsdf {
         for bsdf in bsdfs {
             sum.colors += bsdf.colors;
             sum.ambient += bsdf.ambient;
-            sum.emission += bsdf.emission;
             count += 1.0;
             (least, most) = (least.min(bsdf.colors), most.max(bsdf.colors));
             mean.is_constant &= bsdf == first;
@@ -74,12 +73,7 @@ impl MeanBsdf {
         }
         if !mean.is_constant {
             let part = 1.0 / count;
-            mean.bsdf = Bsdf {
-                colors: sum.colors * part,
-                ambient: sum.ambient * part,
-                emission: sum.emission * part,
-                lobe: sum.lobe,
-            };
+            mean.bsdf = Bsdf { colors: sum.colors * part, ambient: sum.ambient * part, lobe: sum.lobe };
             mean.contrast = most + least * -1.0;
         }
         Some(mean)
@@ -164,7 +158,7 @@ impl VisibleShape {
     /// The material at that hit.
     pub fn bsdf(self, scene: &Scene, ray: &Ray, t: f64, differential: &RayDifferential) -> Bsdf {
         let si = self.interaction(scene, ray, t, differential);
-        scene.materials[si.material.index()].bsdf(&si, &scene.textures)
+        scene.bsdf(&si)
     }
 
     /// The shading point at that hit.
@@ -175,7 +169,7 @@ impl VisibleShape {
             VisibleShape::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.place(ray, t),
             _ => {
                 let si = self.interaction(scene, ray, t, &RayDifferential::default());
-                return ShadingPoint::of(&si, bsdf, scene.ambient);
+                return ShadingPoint::of(&si, bsdf, &scene.ambient);
             }
         };
         self.facing(scene, place, -ray.d, bsdf)
@@ -203,7 +197,7 @@ impl VisibleShape {
         let error = error.widened(scene.geometry.rounding);
         let (n, surface) = (if normal.dot(wo) < 0.0 { -normal } else { normal }, self.surface(scene));
         let receives_shadow = scene.geometry.surfaces[surface.index()].receives_shadow;
-        let base = bsdf.base(scene.ambient);
+        let base = bsdf.base(&scene.ambient);
         ShadingPoint { surface, receives_shadow, base, ..ShadingPoint::new(p, error, n, wo, bsdf) }
     }
 
@@ -220,8 +214,13 @@ impl VisibleShape {
         self.square_bsdf(scene, square).and_then(|of| of.is_constant.then_some(of.bsdf))
     }
 
-    /// The mean material over the camera rays of a pixel that sees only this shape; `None` where lobes differ.
+    /// The mean material over the camera rays of a pixel that sees only this shape; `None` where lobes differ, and of
+    /// materials that emit light.
     pub fn mean_bsdf(self, scene: &Scene, pixel: [u32; 2]) -> Option<MeanBsdf> {
+        let material = scene.geometry.surfaces[self.surface(scene).index()].material;
+        if material.is_some_and(|material| scene.materials[material.index()].is_emissive()) {
+            return None;
+        }
         if let Some(whole) = self.square_bsdf(scene, Square { x: pixel[0], y: pixel[1], side: 1 }) {
             if whole.is_constant {
                 return Some(MeanBsdf::constant(whole.bsdf));
@@ -246,9 +245,9 @@ impl VisibleShape {
             // Half a differential leads to the border
             let part = (0.5 + 2.0 * growth).min(1.0);
             let grown = SurfaceInteraction { footprint: Footprint { dx: dx * part, dy: dy * part, edges }, ..si };
-            material.is_even(&grown, &scene.textures)
+            material.is_even(&grown, &scene.textures, &scene.ambient)
         });
-        Some(SquareBsdf { bsdf: material.bsdf(&si, &scene.textures), is_constant, growth })
+        Some(SquareBsdf { bsdf: material.bsdf(&si, &scene.textures, &scene.ambient), is_constant, growth })
     }
 
     /// The mean material of a pixel by the exact means of textures over parallelograms: from its center, if the

@@ -178,7 +178,7 @@ fn framed(scene: &Scene) -> Option<[[u32; 2]; 2]> {
 /// Advises if every surface is black.
 fn advise_light(cx: &mut CompileContext, scene: &Scene) {
     let shines = |c: &crate::color::Rgb| c.r > 0.0 || c.g > 0.0 || c.b > 0.0;
-    if shines(&scene.ambient) || scene.lights.iter().any(|light| shines(&light.intensity)) {
+    if !scene.ambient.is_black() || scene.lights.iter().any(|light| shines(&light.intensity)) {
         return;
     }
     let message = match scene.lights.len() {

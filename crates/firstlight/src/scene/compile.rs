@@ -22,7 +22,7 @@ use crate::context::{Assets, CompileContext, OnCompile};
 use crate::describe::{Family, SamplesDesc};
 use crate::error::{Diagnostic, SceneError, Severity};
 use crate::light::{Light, LightDesc, check_samples};
-use crate::material::Material;
+use crate::material::{Ambient, Material};
 use crate::math::DVec3;
 use crate::shape::{CompileCache, MeshFiles, ShapeDesc};
 use crate::transform::MAX_TIME;
@@ -239,7 +239,7 @@ impl SceneDesc {
                 antialiasing,
                 tolerance,
                 background: cx.color("background", render.background),
-                ambient: cx.color("ambient", render.ambient),
+                ambient: render.ambient.compile(cx),
                 display: Display { encoding, exposure },
             }
         })
@@ -413,7 +413,7 @@ struct Picture {
     antialiasing: u32,
     tolerance: f64,
     background: Rgb,
-    ambient: Rgb,
+    ambient: Ambient,
     display: Display,
 }
 

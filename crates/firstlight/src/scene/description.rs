@@ -5,7 +5,7 @@ use crate::camera::CameraDesc;
 use crate::describe::{ColorDesc, FilePath, SamplesDesc, table, words};
 use crate::image::{BufferDesc, Plane};
 use crate::light::LightDesc;
-use crate::material::MaterialDesc;
+use crate::material::{AmbientDesc, MaterialDesc};
 use crate::shape::{GroupDesc, ShadowTerminator, ShapeDesc};
 use crate::texture::TextureDesc;
 
@@ -57,7 +57,7 @@ table! {
         /// Leaves what no surface covers transparent, instead of `background`.
         pub transparent: bool = false,
         /// Light from everywhere: added once, times each material's `ambient`.
-        pub ambient: ColorDesc = ColorDesc::BLACK,
+        pub ambient: AmbientDesc = AmbientDesc::Uniform(ColorDesc::BLACK),
         /// How linear light becomes the numbers of an 8- or 16-bit picture.
         pub display: DisplayEncoding = DisplayEncoding::Srgb,
         /// The gamma of `display = "gamma"`, 0.1 to 10.

@@ -52,9 +52,10 @@ use crate::describe::{ColorDesc, SamplesDesc};
 use crate::ids::SurfaceId;
 use crate::image::Buffer;
 use crate::light::Light;
-use crate::material::Material;
+use crate::material::{Ambient, Bsdf, Material};
 use crate::math::{DAffine3, DVec3};
 use crate::shape::ShadowTerminator;
+use crate::shape::SurfaceInteraction;
 use crate::texture::Texture;
 use far::SceneBall;
 pub(crate) use geometry::{At, Geometry, Nearest, ObjectSpace, Placed, PlacedSpot, PlacedTarget, UpperItem};
@@ -83,7 +84,7 @@ pub struct Scene {
     pub(crate) origin: DVec3,
     pub(crate) background: Rgb,
     pub(crate) transparent: bool,
-    pub(crate) ambient: Rgb,
+    pub(crate) ambient: Ambient,
     pub(crate) display: Display,
     pub(crate) geometry: Arc<Geometry>,
     pub(crate) lights: Vec<Light>,
@@ -214,6 +215,18 @@ impl Scene {
     /// The moment that was compiled, in seconds; `None` if nothing in the scene changes with time.
     pub fn time(&self) -> Option<f64> {
         self.time
+    }
+
+    /// The material at a surface, in numbers.
+    #[inline(always)]
+    pub(crate) fn bsdf(&self, si: &SurfaceInteraction) -> Bsdf {
+        self.materials[si.material.index()].bsdf(si, &self.textures, &self.ambient)
+    }
+
+    /// The radiance that the material at a surface emits.
+    #[inline]
+    pub(crate) fn emission(&self, si: &SurfaceInteraction) -> Rgb {
+        self.materials[si.material.index()].emission(si, &self.textures)
     }
 
     /// 64 hexadecimal digits: BLAKE3 of the description, its settings and the files it names. The same at all times:

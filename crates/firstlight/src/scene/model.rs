@@ -148,7 +148,7 @@ impl SceneDesc {
         };
         let mut desc = SceneDesc { shapes: vec![shape], ..SceneDesc::default() };
         desc.render.background = ColorDesc::linear(0.05, 0.055, 0.065);
-        desc.render.ambient = ColorDesc::linear(0.16, 0.17, 0.19);
+        desc.render.ambient = ColorDesc::linear(0.16, 0.17, 0.19).into();
         desc
     }
 

@@ -66,13 +66,13 @@ struct PictureFile {
 }
 
 /// Why there is no picture.
-enum Fault {
+enum TextureFault {
     Read(AssetError),
     Decode(ImageError, usize),
 }
 
 /// A picture with all that is made of it.
-struct Picture<'p> {
+struct SharedPicture<'p> {
     file: &'p PictureFile,
     uses: Vec<TextureUse>,
 }
@@ -157,7 +157,6 @@ impl<'a> TextureRequests<'a> {
     fn colored(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam, covered: bool) -> Param<Rgb> {
         let path = factor_path(field, &param.texture);
         let factor = cx.color(&path, param.factor);
-        advise_reflectance(cx, &path, param.factor.linear);
         let index = param.texture.as_ref().and_then(|name| self.find(cx, &format!("{field}.texture"), name));
         let texture = index.map(|index| {
             let space = self.space(index, TextureSpace::Srgb);
@@ -185,15 +184,15 @@ impl<'a> TextureRequests<'a> {
                 }
             }
         }
-        let read: Vec<Result<PictureFile, Fault>> =
+        let read: Vec<Result<PictureFile, TextureFault>> =
             files.par_iter().map(|(file, ..)| read_file(self.assets, file)).collect();
         // Each content once, however many files have it
-        let mut pictures: Vec<Picture> = Vec::new();
+        let mut pictures: Vec<SharedPicture> = Vec::new();
         let mut picture_of: HashMap<[u8; 32], usize> = HashMap::new();
         for (file, (.., uses)) in read.iter().zip(&files) {
             let Ok(file) = file else { continue };
             let picture = *picture_of.entry(file.hash).or_insert_with(|| {
-                pictures.push(Picture { file, uses: Vec::new() });
+                pictures.push(SharedPicture { file, uses: Vec::new() });
                 pictures.len() - 1
             });
             for of in uses {
@@ -274,8 +273,8 @@ impl<'a> TextureRequests<'a> {
     }
 
     /// Whether all pyramids fit into the budget; before anything is decoded.
-    fn fits(&self, cx: &mut CompileContext, pictures: &[Picture]) -> bool {
-        let bytes = |picture: &Picture| -> u64 { picture.uses.iter().map(|of| picture.bytes_of(*of)).sum() };
+    fn fits(&self, cx: &mut CompileContext, pictures: &[SharedPicture]) -> bool {
+        let bytes = |picture: &SharedPicture| -> u64 { picture.uses.iter().map(|of| picture.bytes_of(*of)).sum() };
         let total: u64 = pictures.iter().map(bytes).sum();
         if total > self.budget {
             let mib = |bytes: u64| bytes.div_ceil(1 << 20);
@@ -292,7 +291,7 @@ impl<'a> TextureRequests<'a> {
 
     fn sizes(
         &self,
-        read: &[Result<PictureFile, Fault>],
+        read: &[Result<PictureFile, TextureFault>],
         file_of: &HashMap<&str, usize>,
     ) -> Vec<(String, &'static str, Option<[u32; 2]>)> {
         let used = |index: usize| self.wanted.iter().any(|(of, _)| *of == index);
@@ -313,14 +312,14 @@ impl<'a> TextureRequests<'a> {
 /// The largest number added to a texture.
 const MAX_BIAS: f64 = 1e6;
 
-fn read_file(assets: &dyn Assets, file: &str) -> Result<PictureFile, Fault> {
-    let bytes = assets.read(file, MAX_TEXTURE_FILE).map_err(Fault::Read)?;
-    let header = read_header(&bytes, &Limits::default()).map_err(|error| Fault::Decode(error, bytes.len()))?;
+fn read_file(assets: &dyn Assets, file: &str) -> Result<PictureFile, TextureFault> {
+    let bytes = assets.read(file, MAX_TEXTURE_FILE).map_err(TextureFault::Read)?;
+    let header = read_header(&bytes, &Limits::default()).map_err(|error| TextureFault::Decode(error, bytes.len()))?;
     let hash = *blake3::hash(&bytes).as_bytes();
     Ok(PictureFile { bytes, hash, header })
 }
 
-impl Picture<'_> {
+impl SharedPicture<'_> {
     /// Bytes that its pyramid for a use takes.
     fn bytes_of(&self, of: TextureUse) -> u64 {
         let PictureHeader { width, height, channels, sample } = self.file.header;
@@ -360,16 +359,16 @@ fn report_damage(cx: &mut CompileContext, path: &str, file: &str, error: &ImageE
     cx.warning(path, message, Some(STANDS_IN));
 }
 
-impl Fault {
+impl TextureFault {
     fn report(&self, cx: &mut CompileContext, path: &str, file: &str) {
         match self {
-            Fault::Decode(error, length) => report_damage(cx, path, file, error, *length),
+            TextureFault::Decode(error, length) => report_damage(cx, path, file, error, *length),
             // Not a texture that happens to be missing, but one that may not be read
-            Fault::Read(error @ AssetError::Outside) => {
+            TextureFault::Read(error @ AssetError::Outside) => {
                 let hint = "copy it there, or allow its folder with --allow-dir";
                 cx.error(path, format!("{file:?}: {error}"), Some(hint));
             }
-            Fault::Read(error) => {
+            TextureFault::Read(error) => {
                 let place = error.slashes(file);
                 let place = place.as_deref().unwrap_or("it is looked for beside the text that names it");
                 cx.warning(path, format!("{file:?}: {error}"), Some(&format!("{place}; {STANDS_IN}")));
@@ -392,11 +391,17 @@ impl Textures<'_> {
 }
 
 impl Params for TextureRequests<'_> {
-    fn color(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb> {
+    fn radiance(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb> {
         self.colored(cx, field, param, false)
     }
 
+    fn color(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb> {
+        advise_reflectance(cx, &factor_path(field, &param.texture), param.factor.linear);
+        self.radiance(cx, field, param)
+    }
+
     fn covered_color(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb> {
+        advise_reflectance(cx, &factor_path(field, &param.texture), param.factor.linear);
         self.colored(cx, field, param, true)
     }
 
@@ -437,7 +442,8 @@ fn factor_path(field: &str, texture: &Option<String>) -> String {
     if texture.is_some() { format!("{field}.factor") } else { field.to_owned() }
 }
 
-/// What stands in for a picture that cannot be had: magenta and black squares, not to be overlooked; no bumps, no holes.
+/// What stands in for a picture that cannot be had: magenta and black squares, not to be overlooked; no bumps, no
+/// holes.
 fn placeholder(of: TextureUse) -> CheckerboardDesc {
     let colors = match of {
         TextureUse::Color(_) | TextureUse::CoveredColor(_) => [ColorDesc::linear(1.0, 0.0, 1.0), ColorDesc::BLACK],

@@ -2,15 +2,16 @@
 //!
 //! `anisotropic` is the elliptical weighted average (Heckbert, "Fundamentals of texture mapping and image warping",
 //! 1989): the footprint's two steps are the columns of a matrix, whose singular values and left singular vectors are
-//! the radii and axes of an ellipse of texels; each counts exp(-2 r^2) - exp(-2), r = 1 on the ellipse. The level is the
-//! one on which the smaller radius is from 1.125 to 2.25 texels, blended with the next. A stripe as wide as the steps of
-//! the footprint leaves at most 2 % of its contrast.
+//! the radii and axes of an ellipse of texels; each counts exp(-2 r^2) - exp(-2), r = 1 on the ellipse. The level is
+//! the one on which the smaller radius is from 1.125 to 2.25 texels, blended with the next. A stripe as wide as the
+//! steps of the footprint leaves at most 2 % of its contrast.
 
 use glam::{DMat2, DVec2};
 
 use super::pyramid::Pyramid;
 use super::texels::{Level, Tables, Texel, of_texels, unweighted, weighted};
 use super::{Filter, Wrap};
+use crate::math::floor;
 
 /// The largest ratio of the axes of an ellipse; the smaller is lengthened. The usual limit of graphics hardware, beyond
 /// which a lookup costs more than it shows.
@@ -20,8 +21,8 @@ const MAX_RATIO: f64 = 16.0;
 const MAGNIFIED: f64 = 0.5;
 
 /// The smaller radius of an ellipse on its level, in texels of that level, is at least this. The boxes of the level
-/// blur as well: with 1 the value is 1.4 display steps rms from the same kernel over the picture itself on a photograph,
-/// with 1.25 0.8 steps, for 1.6 times the texels.
+/// blur as well: with 1 the value is 1.4 display steps rms from the same kernel over the picture itself on a
+/// photograph, with 1.25 0.8 steps, for 1.6 times the texels.
 const SMALLEST_RADIUS: f64 = 1.125;
 
 /// Entries of the table of weights, by the square of the radius.
@@ -42,7 +43,7 @@ const MAX_REACH: f64 = 64.0;
 
 /// A place of a picture to look up.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct TexturePlace {
     /// In texels of the picture, from its upper left corner.
     pub at: DVec2,
     /// The steps of the footprint, in texels.
@@ -61,7 +62,7 @@ pub(super) struct Beyond {
 
 impl Pyramid {
     /// Red, green, blue and alpha, or what else its texels stand for.
-    pub(super) fn value(&self, filter: Filter, place: &Place, beyond: &Beyond) -> [f32; 4] {
+    pub(super) fn value(&self, filter: Filter, place: &TexturePlace, beyond: &Beyond) -> [f32; 4] {
         let beyond = Beyond { border: if self.covered { weighted(beyond.border) } else { beyond.border }, ..*beyond };
         let value = match filter {
             Filter::Nearest => self.levels[0].nearest(place.at, &beyond, &self.tables),
@@ -73,7 +74,7 @@ impl Pyramid {
     }
 
     /// The share of a mask that is solid over a footprint; where it is magnified, 0 or 1.
-    pub(super) fn share(&self, filter: Filter, place: &Place, beyond: &Beyond) -> f32 {
+    pub(super) fn share(&self, filter: Filter, place: &TexturePlace, beyond: &Beyond) -> f32 {
         let Some((numbers, cutoff)) = &self.mask else { return self.value(filter, place, beyond)[0] };
         let finest = || {
             let at = place.at;
@@ -83,7 +84,7 @@ impl Pyramid {
             };
             if number[0] >= *cutoff { 1.0 } else { 0.0 }
         };
-        let radius = Axes::of(&place.steps).map_or(f64::INFINITY, |axes| axes.major.length());
+        let radius = EllipseAxes::of(&place.steps).map_or(f64::INFINITY, |axes| axes.major.length());
         if radius <= MAGNIFIED || matches!(filter, Filter::Nearest | Filter::Bilinear) {
             return finest();
         }
@@ -99,8 +100,8 @@ impl Pyramid {
     }
 
     /// Two levels, each bilinear, by the larger radius of the footprint.
-    fn trilinear(&self, place: &Place, beyond: &Beyond) -> [f32; 4] {
-        let radius = Axes::of(&place.steps).map_or(f64::INFINITY, |axes| axes.major.length());
+    fn trilinear(&self, place: &TexturePlace, beyond: &Beyond) -> [f32; 4] {
+        let radius = EllipseAxes::of(&place.steps).map_or(f64::INFINITY, |axes| axes.major.length());
         let (level, part) = self.level(radius);
         let fine = self.bilinear(level, place.at, beyond);
         if part == 0.0 { fine } else { mix(fine, self.bilinear(level + 1, place.at, beyond), part) }
@@ -117,8 +118,8 @@ impl Pyramid {
         if level == last { (last, 0.0) } else { (level, (radius / size - 1.0).max(0.0) as f32) }
     }
 
-    fn anisotropic(&self, place: &Place, beyond: &Beyond) -> [f32; 4] {
-        let Some(axes) = Axes::of(&place.steps) else {
+    fn anisotropic(&self, place: &TexturePlace, beyond: &Beyond) -> [f32; 4] {
+        let Some(axes) = EllipseAxes::of(&place.steps) else {
             return self.bilinear(self.levels.len() - 1, place.at, beyond);
         };
         let radius = axes.major.length();
@@ -136,7 +137,7 @@ impl Pyramid {
     }
 
     /// The weighted mean over an ellipse of a level.
-    fn ellipse(&self, level: usize, place: &Place, axes: &Axes, beyond: &Beyond) -> [f32; 4] {
+    fn ellipse(&self, level: usize, place: &TexturePlace, axes: &EllipseAxes, beyond: &Beyond) -> [f32; 4] {
         let of = &self.levels[level];
         // One texel stands for all there is
         if of.width == 1 && of.height == 1 {
@@ -167,15 +168,15 @@ fn mix(a: [f32; 4], b: [f32; 4], part: f32) -> [f32; 4] {
 }
 
 /// The axes of the ellipse that a footprint is, in texels of the picture.
-struct Axes {
+struct EllipseAxes {
     major: DVec2,
     minor: DVec2,
 }
 
-impl Axes {
+impl EllipseAxes {
     /// The singular value decomposition of the matrix whose columns are the steps; `None` where it is not finite.
     #[inline(always)]
-    fn of(steps: &[DVec2; 2]) -> Option<Axes> {
+    fn of(steps: &[DVec2; 2]) -> Option<EllipseAxes> {
         let [a, b] = *steps;
         // Of the matrix times its transpose: its eigenvalues are the squares of the singular values
         let (xx, xy, yy) = (a.x * a.x + b.x * b.x, a.x * a.y + b.x * b.y, a.y * a.y + b.y * b.y);
@@ -191,17 +192,29 @@ impl Axes {
         let along = if length > 0.0 { along / length } else { DVec2::X };
         let major = largest.sqrt();
         let minor = if major > 0.0 { DMat2::from_cols(a, b).determinant().abs() / major } else { 0.0 };
-        Some(Axes { major: along * major, minor: along.perp() * minor.min(major) })
+        Some(EllipseAxes { major: along * major, minor: along.perp() * minor.min(major) })
     }
 
     /// With no more than the largest ratio, and no radius below a texel.
     #[inline(always)]
-    fn limited(&self) -> Axes {
+    fn limited(&self) -> EllipseAxes {
         let length = self.major.length();
         let along = self.major / length;
         let minor = self.minor.length().max(length / MAX_RATIO).max(1.0);
-        Axes { major: along * length.max(1.0), minor: along.perp() * minor }
+        EllipseAxes { major: along * length.max(1.0), minor: along.perp() * minor }
     }
+}
+
+/// The largest whole number not above `x`.
+#[inline(always)]
+fn floor_of(x: f32) -> i64 {
+    floor(f64::from(x)) as i64
+}
+
+/// The least whole number not below `x`.
+#[inline(always)]
+fn ceil_of(x: f32) -> i64 {
+    -floor_of(-x)
 }
 
 /// An ellipse in texels of a level.
@@ -258,14 +271,14 @@ impl Level {
     }
 
     fn nearest(&self, at: DVec2, beyond: &Beyond, tables: &Tables) -> [f32; 4] {
-        let (i, j) = (at.x.floor() as i64, at.y.floor() as i64);
+        let (i, j) = (floor(at.x) as i64, floor(at.y) as i64);
         of_texels!(&self.texels, texels => self.at(texels, i, j, beyond, tables))
     }
 
     /// The four nearest texel centres, weighted by distance.
     fn bilinear(&self, at: DVec2, beyond: &Beyond, tables: &Tables) -> [f32; 4] {
         let (x, y) = (at.x - 0.5, at.y - 0.5);
-        let (i, j) = (x.floor(), y.floor());
+        let (i, j) = (floor(x), floor(y));
         let (s, t) = ((x - i) as f32, (y - j) as f32);
         let (i, j) = (i as i64, j as i64);
         of_texels!(&self.texels, texels => {
@@ -302,7 +315,7 @@ impl Level {
         }
         // Count from the texel that holds the middle, whose coordinate may be far from 0
         let middle = [ellipse.at[along] - 0.5, ellipse.at[across] - 0.5];
-        let base = middle.map(f64::floor);
+        let base = middle.map(floor);
         let offset = [(middle[0] - base[0]) as f32, (middle[1] - base[1]) as f32];
         let base = base.map(|v| v as i64);
         // The texels whose centres are on the surface
@@ -313,7 +326,7 @@ impl Level {
             None => [-1_000_000, 1_000_000],
         });
         let reach = ellipse.reach(across) as f32;
-        let lines = [(offset[1] - reach).ceil() as i64, (offset[1] + reach).floor() as i64];
+        let lines = [ceil_of(offset[1] - reach), floor_of(offset[1] + reach)];
         let (mut sum, mut weights) = ([0.0f32; 4], 0.0f32);
         let half = 0.5 / a;
         for line in lines[0].max(allowed[1][0])..=lines[1].min(allowed[1][1]) {
@@ -321,8 +334,8 @@ impl Level {
             let bd = b * d;
             let cd = c * d * d;
             let root = (bd * bd - 4.0 * a * (cd - 1.0)).max(0.0).sqrt();
-            let from = ((offset[0] + (-bd - root) * half).ceil() as i64).max(allowed[0][0]);
-            let to = ((offset[0] + (root - bd) * half).floor() as i64).min(allowed[0][1]);
+            let from = ceil_of(offset[0] + (-bd - root) * half).max(allowed[0][0]);
+            let to = floor_of(offset[0] + (root - bd) * half).min(allowed[0][1]);
             if from > to {
                 continue;
             }

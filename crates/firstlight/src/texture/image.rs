@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DMat2, DVec2};
 
-use super::filter::{Beyond, Place};
+use super::filter::{Beyond, TexturePlace};
 use super::pyramid::Pyramid;
 use crate::context::CompileContext;
 use crate::describe::{ColorDesc, FilePath, table, words};
@@ -142,7 +142,7 @@ impl ImageTexture {
         self.value(uv, &none, 1.0)[0] >= 0.5
     }
 
-    fn place(&self, uv: Vec2, footprint: &Footprint, scale: f32) -> Place {
+    fn place(&self, uv: Vec2, footprint: &Footprint, scale: f32) -> TexturePlace {
         // In texels; row 0 of the picture is v = 1. In f64: a repeated picture has coordinates far from 0
         let size = self.pyramid.size().map(f64::from);
         let at = self.turn * uv.as_dvec2() + self.offset;
@@ -158,7 +158,7 @@ impl ImageTexture {
             });
             Some([ends[0].min(ends[1]), ends[0].max(ends[1])])
         });
-        Place {
+        TexturePlace {
             at: DVec2::new(at.x * size[0], (1.0 - at.y) * size[1]),
             steps: [step(footprint.dx), step(footprint.dy)],
             within,
@@ -171,12 +171,12 @@ mod tests {
     use super::super::pyramid::TextureUse;
     use super::*;
     use crate::color::Rgb;
-    use crate::image::read::{Samples, Texels};
+    use crate::image::read::{TexelSamples, Texels};
 
     /// 2 x 2: red, green over blue, white.
     fn four(filter: Filter, wrap: Wrap) -> ImageTexture {
-        let data = vec![[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]];
-        let data = Samples::U8(data.as_flattened().to_vec());
+        let data = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]];
+        let data = TexelSamples::U8(data.as_flattened().to_vec());
         let texels = Texels { width: 2, height: 2, channels: 3, data };
         let desc = ImageTextureDesc {
             filter,

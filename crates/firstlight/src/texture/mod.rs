@@ -106,7 +106,10 @@ impl Texture {
 /// Where the parameters of materials come from: numbers, and textures by name.
 #[allow(dead_code, reason = "materials with maps and masks come next")]
 pub(crate) trait Params {
-    /// A colour; what alpha its texture has does not matter to it.
+    /// A radiance: 0 or more in each channel. What alpha its texture has does not matter to it.
+    fn radiance(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb>;
+
+    /// A reflectance: the same, and advice where it is more than 1.
     fn color(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb>;
 
     /// A colour whose texture's alpha says where there is anything: smaller pictures are weighted by it. The alpha of

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::TextureSpace;
 use super::texels::{Covered, Level, Normal8, Normal16, Stored, Tables, Texel, of_texels, padded, unit};
 use crate::describe::Channel;
-use crate::image::read::{Samples, Texels};
+use crate::image::read::{TexelSamples, Texels};
 
 /// What a picture is read for: the same file may be several.
 #[allow(dead_code, reason = "materials with masks come next")]
@@ -93,7 +93,7 @@ impl Pyramid {
         let tables = Tables::new(TextureSpace::Raw);
         let numbers = match texels.data {
             // As exact as it is stored
-            Samples::U8(_) if rule.channel != Channel::Luminance && rule.space == TextureSpace::Raw => {
+            TexelSamples::U8(_) if rule.channel != Channel::Luminance && rule.space == TextureSpace::Raw => {
                 Level::new(size, Stored::Gray8, |i, j| u8::write([number(i, j); 4], &tables))
             }
             _ => Level::new(size, Stored::Gray16, |i, j| u16::write([number(i, j).clamp(0.0, 1.0); 4], &tables)),
@@ -175,9 +175,9 @@ fn colors(texels: &Texels, covered: bool) -> Level {
         }};
     }
     match &texels.data {
-        Samples::U8(s) => of_samples!(s, Stored::Gray8, Stored::Rgb8, Stored::Rgba8, Stored::Covered8),
-        Samples::U16(s) => of_samples!(s, Stored::Gray16, Stored::Rgb16, Stored::Rgba16, Stored::Covered16),
-        Samples::F32(s) => {
+        TexelSamples::U8(s) => of_samples!(s, Stored::Gray8, Stored::Rgb8, Stored::Rgba8, Stored::Covered8),
+        TexelSamples::U16(s) => of_samples!(s, Stored::Gray16, Stored::Rgb16, Stored::Rgba16, Stored::Covered16),
+        TexelSamples::F32(s) => {
             let at = |i: usize, j: usize| {
                 let texel = &s[start(i, j)..][..channels];
                 match *texel {
@@ -220,7 +220,7 @@ fn normals(texels: &Texels, tables: &Tables) -> Level {
 fn with_smaller(first: Level, tables: &Tables) -> Vec<Level> {
     let size = [first.width, first.height];
     let mut levels = vec![first];
-    let mut image: Option<Image> = None;
+    let mut image: Option<LevelImage> = None;
     let mut size = size;
     while size != [1, 1] {
         let next = match &image {
@@ -240,11 +240,11 @@ fn with_smaller(first: Level, tables: &Tables) -> Vec<Level> {
 }
 
 /// A level in numbers that are not rounded, row by row.
-type Image = Vec<[f32; 4]>;
+type LevelImage = Vec<[f32; 4]>;
 
 /// The level, of the same kind of texel as the first, that comes nearest to an image.
-fn rounded(first: &Stored, size: [usize; 2], image: &Image, tables: &Tables) -> Level {
-    fn of<T: Texel>(size: [usize; 2], store: fn(Vec<T>) -> Stored, image: &Image, tables: &Tables) -> Level {
+fn rounded(first: &Stored, size: [usize; 2], image: &LevelImage, tables: &Tables) -> Level {
+    fn of<T: Texel>(size: [usize; 2], store: fn(Vec<T>) -> Stored, image: &LevelImage, tables: &Tables) -> Level {
         Level::new(size, store, |i, j| T::write(image[j * size[0] + i], tables))
     }
     match first {
@@ -263,7 +263,7 @@ fn rounded(first: &Stored, size: [usize; 2], image: &Image, tables: &Tables) -> 
 }
 
 /// The image of half the size: means of boxes.
-fn halve([width, height]: [usize; 2], at: impl Fn(usize, usize) -> [f32; 4] + Sync) -> Image {
+fn halve([width, height]: [usize; 2], at: impl Fn(usize, usize) -> [f32; 4] + Sync) -> LevelImage {
     let half = [width, height].map(|side| (side / 2).max(1));
     let mut image = vec![[0.0; 4]; half[0] * half[1]];
     let even = width.is_multiple_of(2) && height.is_multiple_of(2);

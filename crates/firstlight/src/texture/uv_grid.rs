@@ -2,7 +2,7 @@
 
 use crate::context::CompileContext;
 use crate::describe::table;
-use crate::image::read::{Samples, Texels};
+use crate::image::read::{TexelSamples, Texels};
 
 table! {
     /// A grid that shows how a surface is unwrapped: `counts[0]` cells across u in 0..1 and `counts[1]` across v, each
@@ -60,7 +60,7 @@ impl UvGridDesc {
                 samples.extend(color([column, row], [x % CELL, y % CELL], [across, down]));
             }
         }
-        Texels { width, height, channels: 3, data: Samples::U8(samples) }
+        Texels { width, height, channels: 3, data: TexelSamples::U8(samples) }
     }
 }
 
@@ -79,8 +79,9 @@ fn color([column, row]: [u32; 2], [x, y]: [u32; 2], counts: [u32; 2]) -> [u8; 3]
         let x = x.checked_sub(left).filter(|x| *x < 7 * DOT)?;
         let (place, dot) = (x / (4 * DOT), x % (4 * DOT) / DOT);
         let digit = if place == 0 { number / 10 } else { number % 10 };
-        let bit = 14 - (y / DOT * 3 + dot);
-        (dot < 3 && DIGITS[digit as usize] >> bit & 1 == 1).then_some([255; 3])
+        // Between two digits there is a column of paper
+        let from_left = 15 - y / DOT * 3 - dot;
+        (dot < 3 && DIGITS[digit as usize] << 1 >> from_left & 1 == 1).then_some([255; 3])
     };
     line(column, top).or_else(|| line(row, top + 7 * DOT)).unwrap_or(paper)
 }
@@ -93,7 +94,7 @@ mod tests {
     fn red_grows_with_u_and_green_with_v() {
         let picture = UvGridDesc { counts: [4, 2] }.picture();
         assert_eq!((picture.width, picture.height), (256, 128));
-        let Samples::U8(samples) = &picture.data else { panic!() };
+        let TexelSamples::U8(samples) = &picture.data else { panic!() };
         // Beside the lines at the lower left corner of each cell, u and v from 0
         let at = |column: usize, row: usize| {
             let (x, y) = (column * 64 + 2, (1 - row) * 64 + 61);
@@ -107,7 +108,7 @@ mod tests {
     fn every_size_has_its_texels() {
         for counts in [[1, 1], [32, 1], [1, 32], [7, 5]] {
             let picture = UvGridDesc { counts }.picture();
-            let Samples::U8(samples) = &picture.data else { panic!() };
+            let TexelSamples::U8(samples) = &picture.data else { panic!() };
             assert_eq!(samples.len() as u32, 3 * picture.width * picture.height);
         }
     }

@@ -261,8 +261,8 @@ fn seen_points(random: &mut Random, scene: &Scene) -> Vec<Viewpoint> {
             && hit.surface.index() < scene.geometry.surfaces.len()
         {
             let si = scene.local_surface(&ray, &hit, &differential);
-            let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
-            points.push(Viewpoint::of(&ShadingPoint::of(&si, &bsdf, scene.ambient)));
+            let bsdf = scene.bsdf(&si);
+            points.push(Viewpoint::of(&ShadingPoint::of(&si, &bsdf, &scene.ambient)));
         }
     }
     points

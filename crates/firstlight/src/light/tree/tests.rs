@@ -87,7 +87,7 @@ fn truth(light: &Light, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> [[f64; 3]; 
         let Some(sample) = sample.filter(|_| height > 0.0) else { continue };
         let cos_i = height * sample.inverse_distance;
         sums[0] += f64::from(cos_i * sample.weight);
-        let specular = lobe.eval(cos_i, ns.dot(wo), wo.dot(l) * sample.inverse_distance);
+        let specular = lobe.eval(cos_i, ns.dot(wo), wo.dot(l) * sample.inverse_distance).0[1];
         sums[1] += f64::from(specular * sample.weight);
     }
     let measure = area.filter(|area| area.physical).map_or(1.0, |area| area.shape.measure());

@@ -6,10 +6,9 @@ use std::ops::{ControlFlow, Range};
 
 use super::{CellRenderer, FragmentQuery, PIXELS};
 use crate::color::Rgb;
-use crate::film::resolve::LightTerm;
 use crate::ids::LightId;
 use crate::integrate::TOLERANCE;
-use crate::material::{Moments, ShadingPoint};
+use crate::material::{LightTerm, Moments, ShadingPoint};
 use crate::render::fragment::{Fragment, ShadingRate};
 use crate::render::pooled::{PooledLight, PooledVisibility, salt};
 use crate::render::{AaMode, Counts};

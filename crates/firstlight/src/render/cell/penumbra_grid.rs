@@ -336,7 +336,7 @@ impl CellRenderer<'_> {
                     continue;
                 }
             }
-            let terms = mean.bsdf.colors.each(&(moments * *count as f32));
+            let terms = mean.bsdf.colors.reflected(&(moments * *count as f32));
             self.note(fragment, light, FragmentLight::Summed(terms));
         }
         true
@@ -366,7 +366,7 @@ impl CellRenderer<'_> {
         };
         let scale = self.lights.scale(light);
         let others = self.others(fragment, light, counts);
-        let value: Rgb = bsdf.base(self.scene.ambient) + others + scale * bsdf.colors.of(moments);
+        let value: Rgb = bsdf.base(&self.scene.ambient) + others + scale * bsdf.colors.of(moments);
         self.lights.steps(value, scale * bsdf.colors.of(error))
     }
 }

@@ -5,9 +5,9 @@ use std::iter;
 
 use super::{CellRenderer, Pixel, PixelState};
 use crate::film::hits::camera_ray;
-use crate::film::resolve::{LightTerm, PixelTerms};
+use crate::film::resolve::PixelTerms;
 use crate::film::tile::Tile;
-use crate::material::ShadingPoint;
+use crate::material::{LightTerm, ShadingPoint};
 use crate::math::Ray;
 use crate::render::fragment::RayPoint;
 use crate::render::lighting_grid::SurfaceBlock;
@@ -136,8 +136,8 @@ impl CellRenderer<'_> {
                 scene.find_layers(ray, &differential(), end.as_ref().map(|(_, hit)| hit), stack);
                 left = stack.left;
                 for Layer { surface, weight, .. } in &stack.layers {
-                    let bsdf = scene.materials[surface.material.index()].bsdf(surface, &scene.textures);
-                    let point = ShadingPoint::of(surface, &bsdf.weighted(*weight), scene.ambient);
+                    pixel.terms.emission.add(scene.emission(surface), f64::from(*weight));
+                    let point = ShadingPoint::of(surface, &scene.bsdf(surface).weighted(*weight), &scene.ambient);
                     points.push(RayPoint { shape: None, point, at, through_layers: true });
                 }
                 if left == 0.0 {
@@ -154,20 +154,18 @@ impl CellRenderer<'_> {
             }
             let point = match shape {
                 Some(shape) => {
-                    let plain = self.fragments.plain_bsdf(scene, shape);
-                    let mut bsdf = plain.unwrap_or_else(|| shape.bsdf(scene, ray, hit.t, &differential()));
-                    if left != 1.0 {
-                        bsdf = bsdf.weighted(left);
-                    }
+                    let bsdf = self.fragments.plain_bsdf(scene, shape).unwrap_or_else(|| {
+                        let si = shape.interaction(scene, ray, hit.t, &differential());
+                        pixel.terms.emission.add(scene.emission(&si), left.into());
+                        scene.bsdf(&si)
+                    });
+                    let bsdf = bsdf.weighted(left);
                     shape.point(scene, ray, hit.t, &bsdf)
                 }
                 None => {
                     let si = scene.local_surface(ray, &hit, &differential());
-                    let mut bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
-                    if left != 1.0 {
-                        bsdf = bsdf.weighted(left);
-                    }
-                    ShadingPoint::of(&si, &bsdf, scene.ambient)
+                    pixel.terms.emission.add(scene.emission(&si), left.into());
+                    ShadingPoint::of(&si, &scene.bsdf(&si).weighted(left), &scene.ambient)
                 }
             };
             points.push(RayPoint { shape, point, at, through_layers: left != 1.0 });
@@ -220,7 +218,6 @@ impl CellRenderer<'_> {
             all.lobe = all.lobe.with(bsdf.lobe).unwrap_or(all.lobe);
             all.colors = all.colors.max(bsdf.colors);
             all.ambient = all.ambient.min(bsdf.ambient);
-            all.emission = all.emission.min(bsdf.emission);
             let number = means.unwrap_or_default() + square.number(at);
             self.means[number] = Some(mean);
             let index = self.index(at);

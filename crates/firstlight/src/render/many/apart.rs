@@ -71,8 +71,8 @@ impl<'a> Apart<'a> {
             let scale = lights.scale(same[0].0 as usize);
             let of = |sent: f32, scale: f32| if scale > 0.0 { sent / scale } else { 0.0 };
             let unscaled = |sent: Rgb| Rgb::new(of(sent.r, scale.r), of(sent.g, scale.g), of(sent.b, scale.b));
-            let term = same.iter().fold(Colors::BLACK, |sum, (_, sent)| sum + *sent).map(unscaled);
-            scaled.push(ScaledTerm { light: Some(same[0].0), scale, term });
+            let sum = same.iter().fold(Colors::BLACK, |sum, (_, sent)| sum + *sent).map(unscaled);
+            scaled.push(ScaledTerm { light: Some(same[0].0), scale, term: sum.term() });
         }
     }
 }

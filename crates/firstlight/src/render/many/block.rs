@@ -162,7 +162,8 @@ impl<'a> Many<'a> {
         stored.lit[1] = start..self.lit.len() as u32;
         self.add(patch, 0, &mut stored);
         self.add(patch, 1, &mut stored);
-        stored.value = (bsdf.colors * stored.sent).0.into_iter().fold(bsdf.base(scene.ambient), |sum, part| sum + part);
+        stored.value =
+            (bsdf.colors * stored.sent).0.into_iter().fold(bsdf.base(&scene.ambient), |sum, part| sum + part);
         let from = self.singles.len() as u32;
         let mut light = stored.sent.cosine();
         if !singles.is_empty() {

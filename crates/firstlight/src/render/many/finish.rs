@@ -9,7 +9,7 @@ use super::{ANYTHING, Many, PatchLight, SingleLight};
 use crate::color::Rgb;
 use crate::film::resolve::ScaledTerm;
 use crate::integrate::TOLERANCE;
-use crate::material::{Colors, Moments, PerMoment, ShadingPoint};
+use crate::material::{Colors, LightTerm, Moments, PerMoment, ShadingPoint};
 use crate::render::counts::Counts;
 use crate::render::direct::DirectLighting;
 use crate::render::fragment::Fragments;
@@ -64,7 +64,7 @@ impl<'a> Many<'a> {
                 if !is_uncertain(Some(i)) {
                     let SingleLight { light, moments, .. } = self.singles[i as usize];
                     let sums = moments * count;
-                    terms.push((light, bsdf.colors.each(&sums)));
+                    terms.push((light, bsdf.colors.reflected(&sums)));
                 }
             }
             if uncertain.is_empty() {
@@ -95,12 +95,13 @@ impl<'a> Many<'a> {
         // In scene order
         terms.sort_by_key(|(light, _)| *light);
         for same in terms.chunk_by(|a, b| a.0 == b.0) {
-            let term = same.iter().fold(Colors::BLACK, |sum, (_, term)| sum + *term);
+            let mut term = LightTerm::BLACK;
+            same.iter().for_each(|(_, part)| term += *part);
             let light = same[0].0;
             scaled.push(ScaledTerm { light: Some(light), scale: lights.scale(light as usize), term });
         }
         // Nodes hold lights of different scales, which are in their powers
-        scaled.push(ScaledTerm { light: None, scale: Rgb::WHITE, term: together });
+        scaled.push(ScaledTerm { light: None, scale: Rgb::WHITE, term: together.term() });
         Apart::finish(&mut kept, lights, apart);
         (self.terms, self.cache, self.uncertain, self.kept) = (terms, cache, uncertain, kept);
     }

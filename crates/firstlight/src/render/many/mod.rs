@@ -24,7 +24,7 @@ use crate::color::Rgb;
 use crate::film::resolve::ScaledTerm;
 use crate::image::Buffer;
 use crate::light::LightTree;
-use crate::material::{Colors, Lobe, Moments};
+use crate::material::{Colors, LightTerm, Lobe, Moments};
 use crate::math::{Vec3, square};
 use crate::scene::Scene;
 use crate::visibility::ClusterVisibility;
@@ -66,7 +66,7 @@ pub(super) struct Many<'a> {
     lit: Vec<u32>,
     /// The representatives whose visibility is unknown, block by block.
     representatives: Vec<RepresentativeLight>,
-    terms: Vec<(u32, Colors)>,
+    terms: Vec<(u32, LightTerm)>,
     uncertain: Vec<UncertainTerm>,
     apart: Apart<'a>,
     kept: SentApart,

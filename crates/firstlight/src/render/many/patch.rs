@@ -77,7 +77,7 @@ impl Patch {
     }
 
     /// The seed of its samples.
-    pub fn salt(&self) -> u32 {
+    pub fn salt(&self) -> u64 {
         salt(self.at(), self.point.surface)
     }
 

@@ -49,7 +49,7 @@ pub(super) fn receiver_bounds<'p>(patches: impl Iterator<Item = &'p Patch> + Clo
 }
 
 pub(super) fn receiver_colors(scene: &Scene, bsdf: &Bsdf) -> ReceiverColors {
-    ReceiverColors { base: bsdf.base(scene.ambient), known: bsdf.colors.cosine(), error: bsdf.colors }
+    ReceiverColors { base: bsdf.base(&scene.ambient), known: bsdf.colors.cosine(), error: bsdf.colors }
 }
 
 /// The colours of some patches, each once; beyond [`MAX_COLORS`] the bounds of the rest are one entry.

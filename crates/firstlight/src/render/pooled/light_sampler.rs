@@ -17,7 +17,6 @@ use fearless_simd::{Level, f32x16, mask32x16, prelude::*};
 use super::strata::{BlockSamples, StratumSums};
 use crate::accel::{RayPacket16, dispatch_all};
 use crate::color::Rgb;
-use crate::film::resolve::LightTerm;
 use crate::integrate::Emitter;
 use crate::light::{Area, FineCell, MIN_DISTANCE2, Points, SERIES, SeriesPart};
 use crate::material::{Colors, LobeLanes, Moments, PerMoment, ShadingPoint};
@@ -76,7 +75,7 @@ impl SampledReceiver {
     }
 
     /// The light that each moment adds to the pixel.
-    pub fn each(&self, moments: &Moments) -> LightTerm {
+    pub fn each(&self, moments: &Moments) -> Colors {
         self.colors().each(moments)
     }
 

@@ -1,0 +1,137 @@
+//! Metals and dielectrics of some roughness: the material of glTF.
+
+use super::{Ambient, Bsdf, Colors, GgxLobe, Lobe, Material, MaterialCommonDesc, PerMoment, Reflection, ViewGeometry};
+use crate::color::Rgb;
+use crate::context::CompileContext;
+use crate::describe::{ColorParam, NumberParam, table};
+use crate::ids::TextureId;
+use crate::texture::{Param, Params};
+
+table! {
+    /// Metallic-roughness: a dielectric of `base_color` under a clear interface, or a metal of `base_color`, or a mix,
+    /// with a highlight of microfacets.
+    ///
+    /// f = pi x (n.wi) x mix(dielectric, metal, `metallic`); with h = normalize(wi + wo) and w = (1 - wo.h)^5,
+    /// dielectric = base_color / pi (1 - max F) + V D F, F = f0 + (f90 - f0) w, f0 = min(((ior - 1) / (ior + 1))^2
+    /// specular_color, 1) specular, f90 = specular; metal = V D (base_color + (1 - base_color) w). D is the
+    /// distribution of Trowbridge and Reitz (GGX) with alpha = roughness^2, at least 0.003, and V Smith's
+    /// height-correlated masking.
+    ///
+    /// Sources: "glTF 2.0 specification", appendix B; its extensions KHR_materials_ior and KHR_materials_specular. As
+    /// there, rough dielectrics may reflect more light than arrives, at grazing angles.
+    ///
+    /// ```toml
+    /// [material.metallic-roughness.gold]
+    /// base_color = [1.0, 0.77, 0.34]
+    /// metallic = 1
+    /// roughness = 0.3
+    /// ```
+    pub struct MetallicRoughnessDesc {
+        /// The colour of the base or of the metal: 0 to 1 in each channel.
+        pub base_color: ColorParam = ColorParam::gray(0.8),
+        /// 1 for metals, 0 for dielectrics.
+        pub metallic: NumberParam = NumberParam::constant(0.0),
+        /// 0 to 1: the root of alpha.
+        pub roughness: NumberParam = NumberParam::constant(0.5),
+        /// The index of refraction of dielectrics, 1 or more; 0 reflects all light.
+        pub ior: f64 = 1.5,
+        /// The strength of the highlight of dielectrics, 0 to 1.
+        pub specular: NumberParam = NumberParam::constant(1.0),
+        /// The colour of the highlight of dielectrics seen from the front: 0 or more in each channel.
+        pub specular_color: ColorParam = ColorParam::gray(1.0),
+        /// The part of ambient light that arrives, 0 to 1.
+        pub occlusion: NumberParam = NumberParam::constant(1.0),
+        ..common: MaterialCommonDesc,
+    }
+}
+
+/// Metals and dielectrics, their parameters still to be looked up.
+#[derive(Clone, Copy, Debug)]
+pub struct MetallicRoughness {
+    pub(super) base_color: Param<Rgb>,
+    metallic: Param<f32>,
+    roughness: Param<f32>,
+    /// The reflectance of dielectrics seen from the front, before `specular_color`.
+    f0: f32,
+    specular: Param<f32>,
+    specular_color: Param<Rgb>,
+    occlusion: Param<f32>,
+}
+
+impl MetallicRoughnessDesc {
+    pub(crate) fn compile(&self, cx: &mut CompileContext, params: &mut impl Params) -> Material {
+        let hint = "1.5 is glass or plastic, 1.33 water";
+        if self.ior != 0.0 {
+            cx.between("ior", self.ior, 1.0, MAX_IOR, Some(hint));
+        }
+        let f0 = ((self.ior - 1.0) / (self.ior + 1.0)) as f32;
+        let mut unit =
+            |cx: &mut CompileContext, field: &str, of: &NumberParam| params.number(cx, field, of, [0.0, 1.0]);
+        let [metallic, roughness] =
+            [("metallic", &self.metallic), ("roughness", &self.roughness)].map(|(field, of)| unit(cx, field, of));
+        let [specular, occlusion] =
+            [("specular", &self.specular), ("occlusion", &self.occlusion)].map(|(field, of)| unit(cx, field, of));
+        let base_color = params.color(cx, "base_color", &self.base_color);
+        let specular_color = params.color(cx, "specular_color", &self.specular_color);
+        let f0 = f0 * f0;
+        let reflection = MetallicRoughness { base_color, metallic, roughness, f0, specular, specular_color, occlusion };
+        Material { reflection: Reflection::MetallicRoughness(reflection), common: self.common.compile(cx, params) }
+    }
+}
+
+/// The largest index of refraction.
+const MAX_IOR: f64 = 100.0;
+
+impl MetallicRoughness {
+    /// In numbers. Without `ambient` there is no ambient light.
+    #[inline(always)]
+    pub(super) fn evaluate(
+        &self,
+        color: impl Fn(&Param<Rgb>) -> Rgb,
+        number: impl Fn(&Param<f32>) -> f32,
+        ambient: Option<(&Ambient, ViewGeometry)>,
+    ) -> Bsdf {
+        let unit = |param: &Param<f32>| number(param).clamp(0.0, 1.0);
+        let (base_color, metallic, specular) = (color(&self.base_color), unit(&self.metallic), unit(&self.specular));
+        let dielectric = (color(&self.specular_color) * self.f0).map(|f0| f0.min(1.0)) * specular;
+        let strongest = dielectric.r.max(dielectric.g).max(dielectric.b);
+        let colors = self.colors(base_color, metallic, specular, dielectric);
+        // The base receives 1 - max F = (1 - max f0) (1 - grazing w)
+        let grazing = if strongest < 1.0 { (specular - strongest) / (1.0 - strongest) } else { 0.0 };
+        let lobe = GgxLobe::new(unit(&self.roughness), grazing.clamp(0.0, 1.0));
+        let ambient = ambient.map_or(Rgb::BLACK, |(ambient, view)| {
+            let [diffuse, f0, f90] = colors.0;
+            let [near, grazing] = lobe.white_albedo(view.cos_o());
+            ambient.answer(&view, diffuse, f0 * near + f90 * grazing) * unit(&self.occlusion)
+        });
+        Bsdf { colors, ambient, lobe: Lobe::Ggx(lobe) }
+    }
+
+    /// What the base, f0 and f90 are worth.
+    #[inline(always)]
+    fn colors(&self, base_color: Rgb, metallic: f32, specular: f32, dielectric: Rgb) -> Colors {
+        let rest = 1.0 - metallic;
+        let strongest = dielectric.r.max(dielectric.g).max(dielectric.b);
+        let diffuse = base_color * (rest * (1.0 - strongest));
+        PerMoment([diffuse, dielectric * rest + base_color * metallic, Rgb::gray(specular * rest + metallic)])
+    }
+
+    /// The textures of its parameters, those of colours first.
+    pub(super) fn textures(&self) -> [Option<TextureId>; 6] {
+        let numbers = [self.metallic, self.roughness, self.specular, self.occlusion].map(|number| number.texture);
+        let [metallic, roughness, specular, occlusion] = numbers;
+        [self.base_color.texture, self.specular_color.texture, metallic, roughness, specular, occlusion]
+    }
+
+    /// How far the colours of the moments differ all over it, and the answer to ambient light, where `contrast` knows
+    /// that of the base colour's texture; `None` where more than the base colour varies.
+    pub(super) fn contrast(&self, contrast: impl Fn(&Param<Rgb>) -> Option<Rgb>) -> Option<(Colors, Rgb)> {
+        if self.textures()[1..].iter().any(|texture| texture.is_some()) {
+            return None;
+        }
+        let color = contrast(&self.base_color)?;
+        let metallic = self.metallic.factor;
+        let parts = [color * (1.0 - metallic), color * metallic, Rgb::BLACK];
+        Some((PerMoment(parts), parts[0] + parts[1]))
+    }
+}
