@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 use fearless_simd::{Level, prelude::*};
 
-use super::geometry::{At, Geometry, Hit, Nearest, Placed, PlacedSpot, PlacedTarget, UpperItem};
+use super::geometry::{At, Geometry, Hit, Layers, Nearest, Placed, PlacedSpot, PlacedTarget, UpperItem};
 use super::occluders::Opacity;
 use crate::accel::{Aabb, Planes, RayTile, TraceRay, dispatch_eight};
 use crate::ids::{MaterialId, SurfaceId};
@@ -58,17 +58,25 @@ impl Geometry {
 
     /// Whether camera rays inside of `planes` may meet anything that is not opaque.
     pub fn may_meet_layers(&self, level: Level, planes: &Planes) -> bool {
-        let Some(layers) = &self.layers else { return false };
-        !layers.unbounded.is_empty()
-            || !dispatch_eight!(level, simd => layers.upper.gather(simd, |center, half| planes.within(center, half).test(), |item| {
-                let UpperItem::Placed(index) = layers.items[item as usize] else { return false };
-                let Placed { placement, target: PlacedTarget::Mesh(mesh), .. } = &self.placed[index as usize] else {
-                    return false;
-                };
-                let own = planes.placed(&placement.world_from_object, &placement.object_from_world);
-                let tree = &self.meshes[*mesh as usize].tree;
-                tree.gather(simd, |center, half| own.within(center, half).test(), |_| false)
-            }))
+        self.layers.as_ref().is_some_and(|layers| {
+            let has_none = dispatch_eight!(level, simd => self.has_no_layer_within(simd, layers, planes));
+            !layers.unbounded.is_empty() || !has_none
+        })
+    }
+
+    /// Whether no box in the trees of layers is within `planes`.
+    #[inline(always)]
+    fn has_no_layer_within<S: Simd>(&self, simd: S, layers: &Layers, planes: &Planes) -> bool {
+        let is_within = |center, half| planes.within(center, half).test();
+        layers.upper.gather(simd, is_within, |item| {
+            let UpperItem::Placed(index) = layers.items[item as usize] else { return false };
+            let Placed { placement, target: PlacedTarget::Mesh(mesh), .. } = &self.placed[index as usize] else {
+                return false;
+            };
+            let own = planes.placed(&placement.world_from_object, &placement.object_from_world);
+            let tree = &self.meshes[*mesh as usize].tree;
+            tree.gather(simd, |center, half| own.within(center, half).test(), |_| false)
+        })
     }
 
     /// The boxes around all that lies in trees and has an end.

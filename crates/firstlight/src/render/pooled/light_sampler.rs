@@ -17,7 +17,7 @@ use fearless_simd::{Level, f32x16, mask32x16, prelude::*};
 use super::strata::{BlockSamples, StratumSums};
 use crate::accel::{RayPacket16, dispatch_all};
 use crate::color::Rgb;
-use crate::integrate::Emitter;
+use crate::integrate::{Emitter, TOLERANCE};
 use crate::light::{Area, FineCell, MIN_DISTANCE2, Points, SERIES, SeriesPart};
 use crate::material::{Colors, LobeLanes, Moments, PerMoment, ShadingPoint};
 use crate::math::{DVec3, LANES, LightEnd, ShadowRay, Vec3, Vec3x16};
@@ -29,8 +29,6 @@ use crate::visibility::{ShadowView, Target, Viewpoint};
 /// Points of the smallest set, and of the largest that is kept.
 pub(super) const FEWEST: usize = 16;
 pub(super) const MOST_KEPT: usize = 1 << 11;
-/// Samples of which layers leave parts that differ by less are dimmed alike.
-const SAME_LEFT: f32 = 1.0 / 32.0;
 const SIZES: usize = (MOST_KEPT / FEWEST).ilog2() as usize + 1;
 
 /// The sets of points of one light that are kept, each made when it is first needed: by series and by size, those that
@@ -340,7 +338,7 @@ impl<'a, S: Simd> ReceiverLanes<'a, S> {
             std::array::from_fn(|lane| if is_lit(lane) { of_layers.map_or(1.0, |left| left[lane]) } else { 0.0 });
         let sending = (0..LANES).filter(|lane| samples.sends >> lane & 1 == 1);
         let (least, most) = sending.fold((1.0f32, 0.0f32), |(a, b), lane| (a.min(left[lane]), b.max(left[lane])));
-        let border = if most - least > SAME_LEFT { 0.5 * (least + most) } else { 1.0 };
+        let border = if most - least > TOLERANCE.same_left { 0.5 * (least + most) } else { 1.0 };
         let dimmed = (0..LANES).filter(|lane| left[*lane] < border).fold(0, |bits, lane| bits | 1 << lane);
         samples.hidden = samples.sends & dimmed;
         left
