@@ -100,8 +100,8 @@ pub use light::{
     SphereLightDesc, SpotDesc,
 };
 pub use material::{
-    AmbientDesc, AmbientGradientDesc, BlinnPhongDesc, MaterialCommonDesc, MaterialDesc, MetallicRoughnessDesc,
-    PhongDesc, UnlitDesc,
+    AlphaMode, AmbientDesc, AmbientGradientDesc, BlinnPhongDesc, MaterialCommonDesc, MaterialDesc,
+    MetallicRoughnessDesc, PhongDesc, UnlitDesc,
 };
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
 pub use render::{LightCounts, RenderStats, render, render_image};

@@ -352,8 +352,11 @@ fn light() -> impl Strategy<Value = LightDesc> {
 }
 
 fn material() -> impl Strategy<Value = MaterialDesc> {
-    let common = (color_param(), number())
-        .prop_map(|(emissive, emissive_strength)| MaterialCommonDesc { emissive, emissive_strength });
+    let common = (color_param(), number()).prop_map(|(emissive, emissive_strength)| MaterialCommonDesc {
+        emissive,
+        emissive_strength,
+        ..MaterialCommonDesc::default()
+    });
     (any::<bool>(), color_param(), color_param(), maybe(color_param()), number_param(), common).prop_map(
         |(blinn, diffuse, specular, ambient, shininess, common)| match blinn {
             true => MaterialDesc::BlinnPhong(BlinnPhongDesc { diffuse, specular, ambient, shininess, common }),

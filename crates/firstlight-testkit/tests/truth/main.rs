@@ -1,6 +1,7 @@
 //! Is the light right? Pictures against what can be known without a renderer: closed forms, symmetry, proofs, another
 //! program's picture. Everything here goes through the public interface, but for the light points of [`graded`].
 
+mod alpha;
 mod analytic;
 mod area_lights;
 mod buffers;

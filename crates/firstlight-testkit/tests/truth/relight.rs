@@ -135,6 +135,29 @@ fn lights_that_share_a_pixel_are_lit_again() {
 }
 
 #[test]
+fn lights_beside_surfaces_that_emit_light_are_lit_again() {
+    let of = |strength: &str| {
+        let [_, fill, lamp] = BEFORE;
+        let sign = "[material.phong.sign]\ndiffuse = 0.2\nemissive = [0.7, 0.4, 0.1]\n\
+                    [[rectangle]]\ncenter = [1.5, 1.2, 0.5]\nsize = [2, 1]\nnormal = [0, 0, 1]\nmaterial = \"sign\"\n";
+        compiled(&(text(strength, fill, lamp, "samples = 9\nbuffers = [\"relight\"]") + sign))
+    };
+    let sampled = RenderSettings { aa_mode: AaMode::Full, ..RenderSettings::default() };
+    let file = rendered(&of(BEFORE[0]), &sampled);
+    let relit = relight(&file, &[("key".into(), LightChange::Strength(0.4))]).unwrap();
+    let truth = film(&of("strength = 0.4"), &sampled).develop();
+    let both = pixels(&relit.image).iter().zip(pixels(&truth));
+    let worst = both.clone().map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(worst < 1e-6, "{worst}");
+    let off = both.filter(|(a, b)| a != b).count();
+    assert!(off < pixels(&truth).len() / 8, "{off} numbers differ: more than those of pixels that see the sign");
+    // What surfaces emit is not the light's
+    let dark = relight(&file, &[("key".into(), LightChange::Strength(0.0))]).unwrap();
+    let sign = dark.image.pixels.iter().map(|pixel| pixel[0]).fold(0.0, f32::max);
+    assert!(sign >= 0.7, "{sign}");
+}
+
+#[test]
 fn many_lights_are_lit_again() {
     let lamps = |strength: f64| -> String {
         let lamp = |i: u32| {

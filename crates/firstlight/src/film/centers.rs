@@ -61,10 +61,11 @@ fn fill_some(
         hits.trace(scene, block);
         for [i, j] in block.pixels() {
             let ray = hits.ray([i, j]);
-            let center = hits.get([i, j], 0, 0).map(|hit| {
-                let differential = if has_texture { grid_ray(scene, 1, i, j).1 } else { RayDifferential::default() };
-                Center::new(scene, ray, differential, hit)
-            });
+            let needs_differential = has_texture || scene.has_layers();
+            let differential = if needs_differential { grid_ray(scene, 1, i, j).1 } else { RayDifferential::default() };
+            let center = scene
+                .shown(&ray, &differential, hits.get([i, j], 0, 0))
+                .map(|hit| Center::new(scene, ray, differential, hit));
             for (number, plane) in planes {
                 let value = match (&center, there) {
                     (Some(center), Some(there)) if *plane == Plane::Motion => {

@@ -6,7 +6,8 @@ use fearless_simd::Level;
 use super::centers::Center;
 use crate::camera::Camera;
 use crate::math::{DVec3, Ray, UNIT_ROUNDOFF};
-use crate::scene::Scene;
+use crate::scene::{Hit, Scene};
+use crate::shape::RayDifferential;
 
 /// Pixels to the right and down, and the visibility there: 1 visible, 0 occluded, -1 outside of what the camera images.
 pub(super) type Flow = [f32; 3];
@@ -42,9 +43,7 @@ pub(super) fn of_nothing(here: &Scene, there: &Scene, ray: &Ray, level: Level) -
     let from_there = o + (here.origin - there.origin);
     let ends = (here.camera.local_project_end(o, d), there.camera.local_project_end(from_there, d));
     let (Some(before), Some(after)) = ends else { return nowhere() };
-    flow(before, after, || {
-        is_inside(there, after) && there.intersect_at(level, &ray_at(&there.camera, after)).is_none()
-    })
+    flow(before, after, || is_inside(there, after) && first_at(there, level, &ray_at(&there.camera, after)).is_none())
 }
 
 fn flow(before: [f64; 2], after: [f64; 2], is_seen: impl FnOnce() -> bool) -> Flow {
@@ -68,6 +67,11 @@ fn ray_at(camera: &Camera, [x, y]: [f64; 2]) -> Ray {
     camera.local_ray(x as f32, y as f32, 1.0).0
 }
 
+/// What a ray through a point shows.
+fn first_at(scene: &Scene, level: Level, ray: &Ray) -> Option<Hit> {
+    scene.shown(ray, &RayDifferential::default(), scene.intersect_at(level, ray))
+}
+
 /// The error bound of a coordinate of that size.
 fn roundings(size: f64) -> f64 {
     size * f64::from(UNIT_ROUNDOFF) * f64::from(ROUNDINGS)
@@ -82,7 +86,7 @@ fn is_seen(center: &Center, there: &Scene, level: Level, p: DVec3, front: DVec3,
     let error = center.error() + roundings(center.p().abs().max(p.abs()).max_element()) + roundings(t.abs());
     let is_front = front.dot(d) < 0.0;
     let faces = is_front == center.is_front();
-    let Some(hit) = there.intersect_at(level, &ray) else {
+    let Some(hit) = first_at(there, level, &ray) else {
         // At an edge that the ray just misses; or it is the side that rays pass through
         return faces;
     };

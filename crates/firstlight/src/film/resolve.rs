@@ -41,11 +41,12 @@ struct KeptSum {
     pixels: Vec<[f32; 3]>,
 }
 
-/// Sums over the rays of a pixel of all terms but the light of lights.
+/// Sums over the rays of a pixel of all terms but the light of lights. Of a ray with layers each counts as the part of
+/// the ray that ends there.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PixelTerms {
-    /// The number of rays without a hit.
-    pub background: u32,
+    /// The parts of rays that nothing stops: 1 of each without a hit.
+    pub background: f64,
     /// The emission of visible lights and of surfaces.
     pub emission: Emission,
     pub ambient: Rgb,
@@ -56,10 +57,10 @@ pub(crate) struct PixelTerms {
 pub(crate) struct Emission([f64; 3]);
 
 impl Emission {
-    /// Adds the radiance of what `rays` rays meet.
-    pub fn add(&mut self, radiance: Rgb, rays: u32) {
+    /// Adds the radiance of what `rays` rays meet, parts of rays included.
+    pub fn add(&mut self, radiance: Rgb, rays: f64) {
         for (sum, radiance) in self.0.iter_mut().zip(radiance.to_array()) {
-            *sum += f64::from(radiance) * f64::from(rays);
+            *sum += f64::from(radiance) * rays;
         }
     }
 

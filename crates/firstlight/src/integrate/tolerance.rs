@@ -93,6 +93,9 @@ pub(crate) struct Tolerance {
     pub stratified: f32,
     /// A factor of the mean contribution: strata beyond it are split.
     pub heavy: f32,
+    /// A part of a sample's light: samples of a group of which layers leave parts that differ by less are dimmed alike,
+    /// and the group is not one that a silhouette crosses.
+    pub same_left: f32,
     /// In pixels: the weight of a pixel at which others are interpolated. It is the mean sum of squares of the nine
     /// interpolation weights, so that noise makes the same error as in a pixel of its own.
     pub node_pixels: f32,
@@ -145,6 +148,7 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     few_groups: 14.0,
     stratified: 0.5,
     heavy: 2.0,
+    same_left: 1.0 / 32.0,
     node_pixels: 0.64,
     cut_error: 1.5,
     lenient: 1.25,

@@ -43,6 +43,12 @@ pub struct Bsdf {
 }
 
 impl Bsdf {
+    /// The same, of which only a part is seen: what leaves is so many times as much.
+    #[inline(always)]
+    pub(crate) fn weighted(self, weight: f32) -> Bsdf {
+        Bsdf { colors: self.colors * weight, ambient: self.ambient * weight, ..self }
+    }
+
     /// What leaves under such ambient light.
     #[inline(always)]
     pub(crate) fn base(&self, ambient: &Ambient) -> Rgb {

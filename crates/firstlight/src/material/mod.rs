@@ -1,5 +1,6 @@
 //! Materials: how a surface turns the light that arrives into the light that leaves.
 
+mod alpha;
 mod ambient;
 mod blinn_phong;
 mod bsdf;
@@ -14,6 +15,7 @@ mod phong;
 mod shading_point;
 mod unlit;
 
+pub use alpha::{Alpha, AlphaMode};
 pub(crate) use ambient::ViewGeometry;
 pub use ambient::{Ambient, AmbientDesc, AmbientGradientDesc};
 pub use blinn_phong::{BlinnPhongDesc, BlinnPhongLobe};

@@ -39,7 +39,7 @@ use crate::image::Buffer;
 use crate::integrate::TOLERANCE;
 use crate::material::{Bsdf, Colors, LightTerm, Moments, PARTS};
 use crate::math::Ray;
-use crate::scene::Scene;
+use crate::scene::{LayerStack, Scene};
 use crate::visibility::Visibility;
 use mesh_shadows::MeshShadows;
 
@@ -108,6 +108,8 @@ pub(crate) struct CellRenderer<'a> {
     /// Of one pixel: its camera rays, and their hits.
     rays: Vec<Ray>,
     ray_points: Vec<RayPoint>,
+    /// The layers of one ray.
+    stack: LayerStack,
     hits: PixelHits,
     /// The lights to be estimated at each [`ShadingRate`].
     queues: [Vec<FragmentQuery>; 3],
@@ -138,6 +140,7 @@ impl<'a> CellRenderer<'a> {
             pixel_rays,
             rays: Vec::new(),
             ray_points: Vec::new(),
+            stack: LayerStack::default(),
             hits,
             queues: Default::default(),
             shadows: MeshShadows::new(scene, few),
@@ -496,7 +499,7 @@ impl<'a> CellRenderer<'a> {
             self.trace_rays(*fragment as usize, counts);
             sampled[*fragment as usize] += usize::from(self.lights.is_integrated(*light as usize));
         }
-        if self.scene.geometry.has_boxes() {
+        if self.scene.geometry.is_sampled_past() {
             for (fragment, sampled) in sampled.iter_mut().enumerate() {
                 *sampled += self.count_sampled(fragment);
             }

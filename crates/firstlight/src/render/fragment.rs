@@ -21,6 +21,8 @@ pub(crate) struct RayPoint {
     pub point: ShadingPoint,
     /// Column and row in the pixel of the ray.
     pub at: [u16; 2],
+    /// Whether it is a layer, or is seen through one.
+    pub through_layers: bool,
 }
 
 /// The number of shading points of a fragment.
@@ -45,6 +47,8 @@ pub(crate) struct Fragment {
     pub count: u32,
     /// The share of the pixel by which its errors are judged.
     pub share: f32,
+    /// Whether any of its rays has layers: others may fill the pixel too.
+    pub through_layers: bool,
     /// Its center among [`Fragments::points`]; none if that cannot represent it.
     pub center: Range<usize>,
     /// Its quadrants among them, once they are computed: none if it is to be lit at each ray.
@@ -125,24 +129,40 @@ impl Fragments {
     /// for each ray unless `grouped`.
     pub fn add(&mut self, scene: &Scene, number: u32, at: [u32; 2], rays: &mut Vec<RayPoint>, grouped: bool) {
         let all = (scene.antialiasing * scene.antialiasing) as f32;
-        while let Some(RayPoint { shape, point, .. }) = rays.first().copied() {
+        while let Some(RayPoint { shape, point, through_layers, .. }) = rays.first().copied() {
             let first = self.rays.len();
-            let mut is_first = true;
+            let (mut is_first, mut last) = (true, None);
             let is_alike = |ray: &mut RayPoint| {
                 let is_same = || ray.shape == shape && (shape.is_some() || is_one_surface(&point, &ray.point));
-                std::mem::take(&mut is_first) || grouped && is_same()
+                // Of several layers of one surface on a ray, each is in a fragment of its own
+                let is_alike = std::mem::take(&mut is_first)
+                    || grouped && ray.through_layers == through_layers && last != Some(ray.at) && is_same();
+                if is_alike {
+                    last = Some(ray.at);
+                }
+                is_alike
             };
             for RayPoint { point, at, .. } in rays.extract_if(.., is_alike) {
                 self.rays.push(point);
                 self.at.push(at);
             }
             let share = if grouped { (self.rays.len() - first) as f32 / all } else { 1.0 };
-            self.push(scene, number, at, shape, first, share);
+            self.push(scene, number, at, shape, first, share, through_layers);
         }
     }
 
     /// Adds a fragment of the rays from number `first` on.
-    fn push(&mut self, scene: &Scene, pixel: u32, at: [u32; 2], shape: Option<VisibleShape>, first: usize, share: f32) {
+    #[allow(clippy::too_many_arguments, reason = "a pixel, and what all rays of the fragment have")]
+    fn push(
+        &mut self,
+        scene: &Scene,
+        pixel: u32,
+        at: [u32; 2],
+        shape: Option<VisibleShape>,
+        first: usize,
+        share: f32,
+        through_layers: bool,
+    ) {
         let rays = first..self.rays.len();
         let closed_form_budget = 1.0 / rays.len() as f32;
         for point in &mut self.rays[rays.clone()] {
@@ -166,6 +186,7 @@ impl Fragments {
             mean,
             count: rays.len() as u32,
             share,
+            through_layers,
             center: points..self.points.len(),
             quadrants: None,
             rays,
@@ -205,6 +226,7 @@ impl Fragments {
             mean: MeanBsdf::constant(bsdf),
             count: n * n,
             share: 1.0,
+            through_layers: false,
             center: first..first,
             quadrants: Some(first..self.points.len()),
             rays: 0..0,
@@ -341,12 +363,13 @@ fn center_in_trees<'a>(
     let first = points.clone().next()?;
     let mean = |from: u32, sum: f32| from as f32 + (sum / count + 0.5) / n as f32;
     let (ray, differential) = scene.camera.local_ray(mean(i, x), mean(j, y), 1.0 / n as f32);
-    let hit = scene.intersect_local(&ray).filter(|hit| hit.surface == first.surface)?;
-    let si = scene.local_surface(&ray, &hit, &differential);
-    let mut center = ShadingPoint::of(&si, bsdf, &scene.ambient);
-    if !is_one_surface(&center, first) {
-        return None;
-    }
+    let hit = scene.intersect_local(&ray).filter(|hit| hit.surface == first.surface);
+    let layers = scene.layers_of(&ray, first.surface);
+    let mut center = hit.into_iter().chain(layers).find_map(|hit| {
+        let si = scene.local_surface(&ray, &hit, &differential);
+        let center = ShadingPoint::of(&si, bsdf, &scene.ambient);
+        is_one_surface(&center, first).then_some(center)
+    })?;
     let mut normals = Vec3::ZERO;
     for point in points {
         center.reach = center.reach.max((point.p - center.p).length());

@@ -53,6 +53,8 @@ pub(super) struct PointObstacles<'a> {
     pub disks: &'a [DiskShadow],
     /// All that lies in trees, and the light that it may occlude.
     pub trees: Option<(&'a Geometry, LightEnd)>,
+    /// All that is not opaque, in a scene, and the light that it may dim.
+    pub layers: Option<(&'a Scene, LightEnd)>,
     /// For each block of samples, those that are known to be hidden; empty if none are.
     pub hidden: &'a [u16],
 }
@@ -65,7 +67,11 @@ impl<'a> PointObstacles<'a> {
     }
 
     fn are_none(&self) -> bool {
-        self.spheres.is_empty() && self.flats.is_empty() && self.disks.is_empty() && self.trees.is_none()
+        self.spheres.is_empty()
+            && self.flats.is_empty()
+            && self.disks.is_empty()
+            && self.trees.is_none()
+            && self.layers.is_none()
     }
 }
 
@@ -136,9 +142,28 @@ fn gather_area<S: Simd>(
                 continue;
             }
         }
+        let left = match obstacles.layers {
+            None => None,
+            Some((scene, to)) => {
+                let mut ways = [[0.0; LANES]; 3];
+                for (way, l) in ways.iter_mut().zip([l.x, l.y, l.z]) {
+                    l.store_slice(way);
+                }
+                let left = left_by_layers(scene, point, to, &ways, lit.to_bitmask() as u16);
+                let left = f32x16::simd_from(simd, left);
+                lit &= left.simd_gt(zero);
+                if lit.all_false() {
+                    continue;
+                }
+                Some(left)
+            }
+        };
         // The emission in this direction, times the lobe
         let inverse_distance = splat(1.0) / distance2.sqrt();
-        let weight = area.weight_lanes(points, index, l, inverse_distance);
+        let mut weight = area.weight_lanes(points, index, l, inverse_distance);
+        if let Some(left) = left {
+            weight *= left;
+        }
         let cos_i = height * inverse_distance;
         let cos_io = wo.dot(l) * inverse_distance;
         for (sum, [moment]) in sums.iter_mut().zip(lobe.moments([cos_i], splat(cos_o), [cos_io], [weight])) {
@@ -160,12 +185,31 @@ fn hidden_by_trees(
     active: u16,
 ) -> u16 {
     let from = Viewpoint::of(point).ray(to, Vec3::ZERO, true);
+    geometry.are_blocked(level, &shadows_from(&from, l), active)
+}
+
+/// The parts of the light along the shadow rays `l` from a point, of the lanes in `active`, that layers let through.
+#[inline(never)]
+fn left_by_layers(
+    scene: &Scene,
+    point: &ShadingPoint,
+    to: LightEnd,
+    l: &[[f32; LANES]; 3],
+    active: u16,
+) -> [f32; LANES] {
+    let from = Viewpoint::of(point).ray(to, Vec3::ZERO, true);
+    scene.left_by_layers16(&shadows_from(&from, *l), active)
+}
+
+/// Shadow rays `l` from one point.
+fn shadows_from(from: &ShadowRay, l: [[f32; LANES]; 3]) -> ShadowRays<'_> {
     let o = from.start.to_array().map(|o| [o; LANES]);
-    let mut shadows = ShadowRays { from: &[from], rays: RayPacket16 { o, d: l }, t_end: [0.0; LANES] };
+    let mut shadows =
+        ShadowRays { from: std::slice::from_ref(from), rays: RayPacket16 { o, d: l }, t_end: [0.0; LANES] };
     for (lane, end) in shadows.t_end.iter_mut().enumerate() {
-        *end = ShadowRay { l: shadows.rays.d(lane), ..from }.end();
+        *end = ShadowRay { l: shadows.rays.d(lane), ..*from }.end();
     }
-    geometry.are_blocked(level, &shadows, active)
+    shadows
 }
 
 #[inline(always)]
@@ -207,7 +251,8 @@ impl Lighting for Lanes {
         disks.extend(scene.that_stop(&self.disks, id).map(|(_, disk)| disk.shape));
         let trees = scene.geometry.has_trees().then(|| (&*scene.geometry, scene.light_end(id)));
         let obstacles = if light.shadows && point.receives_shadow {
-            PointObstacles { spheres, flats, disks, trees, hidden: &[] }
+            let layers = scene.has_layers().then(|| (scene, scene.light_end(id)));
+            PointObstacles { spheres, flats, disks, trees, layers, hidden: &[] }
         } else {
             PointObstacles::default()
         };

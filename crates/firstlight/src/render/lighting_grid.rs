@@ -267,7 +267,8 @@ impl LightingGrid {
     ) -> bool {
         let colors = lights.scale(light as usize) * block.bsdf.colors;
         let base = block.bsdf.base(&lights.scene.ambient);
-        let is_behind = lights.scene.geometry.has_trees() && center.visibility == Visibility::Partial;
+        let geometry = &lights.scene.geometry;
+        let is_behind = (geometry.has_trees() || geometry.layers.is_some()) && center.visibility == Visibility::Partial;
         // Where silhouettes move far, the edge of a penumbra may run between the nodes
         let is_crossed = square.side > SMALLEST && center.motion > TOLERANCE.motion;
         let steps = |k: usize, error: &Moments| lights.steps(colors.onto(base, &nodes[k]), colors.of(error));

@@ -38,7 +38,8 @@ impl<'a> Lights<'a> {
         let scales = scene.lights.iter().map(scale).collect();
         let targets = Target::of_all(scene);
         let point_sets = emitters.iter().map(|_| LightPointSets::default()).collect();
-        let tree = (scene.lights.len() > FEW_LIGHTS)
+        // Nodes are lit or not: what veils leave of a light is known light by light
+        let tree = (scene.lights.len() > FEW_LIGHTS && !scene.has_blends())
             .then(|| LightTree::new(&scene.lights, &scene.geometry.links.classes(scene.lights.len())));
         let obstacles = emitters.iter().enumerate().map(|(index, emitter)| {
             emitter.as_ref().map_or_else(LightOccluders::default, |emitter| LightOccluders::new(scene, index, emitter))
@@ -52,11 +53,12 @@ impl<'a> Lights<'a> {
         Lights { emitters, integrated, scales, steps, tree, targets, point_sets, obstacles, allowed, least }
     }
 
-    /// Whether anything in trees may occlude light `index`, but for planes that have a closed form.
+    /// Whether anything in trees, or not opaque, may stop some of light `index`, but for planes that have a closed
+    /// form.
     pub fn has_trees(&self, scene: &Scene, index: usize) -> bool {
         let geometry = &scene.geometry;
         let stops = |thing: &u32| geometry.stops(geometry.placed[*thing as usize].shadow, LightId(index as u32));
-        geometry.has_boxes() || !self.know(index, geometry.unbounded.iter().copied().filter(stops))
+        geometry.is_sampled_past() || !self.know(index, geometry.unbounded.iter().copied().filter(stops))
     }
 
     /// Whether all of these placed shapes have a closed form as occluders of light `index`.

@@ -35,6 +35,9 @@ impl ListedOccluderCache {
         let stops = |opacity: Opacity| scene.geometry.stops(opacity, light);
         self.spheres.iter().any(|sphere| sphere.shape.blocks(l, finite) && stops(sphere.opacity))
             || self.flats.iter().any(|flat| flat.shape.blocks(l, finite) && stops(flat.opacity))
-            || scene.occluded_but_by_lists(&from.ray(scene.light_end(light), l, finite))
+            || {
+                let ray = from.ray(scene.light_end(light), l, finite);
+                scene.occluded_but_by_lists(&ray) || scene.left_by_layers(&ray) == 0.0
+            }
     }
 }

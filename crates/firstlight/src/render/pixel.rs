@@ -9,7 +9,8 @@ use crate::film::resolve::{PixelTerms, ScaledTerm, TermSums};
 use crate::ids::LightId;
 use crate::material::{Bsdf, LightTerm, MOMENTS, Moments, PerMoment, ShadingPoint};
 use crate::math::{LaneSum, Ray};
-use crate::scene::{Hit, Scene, TracedHit};
+use crate::scene::{Hit, LayerStack, Scene, TracedHit};
+use crate::shape::{RayDifferential, SurfaceInteraction};
 
 /// How the light of one source is summed at one surface: the only difference between those renderers.
 pub(crate) trait Lighting {
@@ -36,11 +37,17 @@ pub(crate) struct PixelSum {
     terms: PixelTerms,
     /// In scene order.
     lights: Vec<LightTerm>,
+    /// The layers of one ray.
+    stack: LayerStack,
 }
 
 impl PixelSum {
     pub fn new(scene: &Scene) -> Self {
-        PixelSum { terms: PixelTerms::default(), lights: vec![LightTerm::BLACK; scene.lights.len()] }
+        PixelSum {
+            terms: PixelTerms::default(),
+            lights: vec![LightTerm::BLACK; scene.lights.len()],
+            stack: LayerStack::default(),
+        }
     }
 
     pub fn clear(&mut self) {
@@ -68,31 +75,60 @@ impl PixelSum {
                     counts.next_question = counts.shadow_rays + QUESTION_EVERY;
                     go_on()?;
                 }
-                let seen = scene.see(&ray, hit(column, row, &ray), &differential);
-                if let Some(point) = self.see(scene, seen) {
-                    self.add_lights(scene, &point, lighting, counts);
-                }
+                let end = hit(column, row, &ray);
+                self.see_ray(scene, &ray, &differential, end, |pixel, point| {
+                    pixel.add_lights(scene, &point, lighting, counts);
+                });
             }
         }
         ControlFlow::Continue(())
     }
 
-    /// Adds the background, the emission or the ambient light of a hit. Returns the shading point of a surface, whose
-    /// other light is added by [`light`](Self::light).
-    pub fn see(&mut self, scene: &Scene, seen: TracedHit) -> Option<ShadingPoint> {
-        match seen {
-            TracedHit::Background => self.terms.background += 1,
-            TracedHit::Emission(radiance) => self.terms.emission.add(radiance, 1),
-            TracedHit::Surface(si) => {
-                // Evaluate the textures of the material
-                let bsdf = scene.bsdf(&si);
-                let point = ShadingPoint::of(&si, &bsdf, &scene.ambient);
-                self.terms.ambient += point.base;
-                self.terms.emission.add(scene.emission(&si), 1);
-                return Some(point);
+    /// Adds what a camera ray that ends at the opaque thing `end` sees, front to back: the background, emission, or
+    /// ambient light. Calls `lit` with the shading point of each surface, whose other light is added by
+    /// [`light`](Self::light); its reflectances are those of the part of the ray that ends there.
+    #[inline(always)]
+    pub fn see_ray(
+        &mut self,
+        scene: &Scene,
+        ray: &Ray,
+        differential: &RayDifferential,
+        end: Option<Hit>,
+        mut lit: impl FnMut(&mut Self, ShadingPoint),
+    ) {
+        let mut left = 1.0;
+        if scene.has_layers() {
+            let mut stack = std::mem::take(&mut self.stack);
+            scene.find_layers(ray, differential, end.as_ref(), &mut stack);
+            for layer in &stack.layers {
+                let point = self.see_surface(scene, &layer.surface, layer.weight);
+                lit(self, point);
+            }
+            left = stack.left;
+            self.stack = stack;
+            if left == 0.0 {
+                return;
             }
         }
-        None
+        match scene.see(ray, end, differential) {
+            TracedHit::Background => self.terms.background += f64::from(left),
+            TracedHit::Emission(radiance) => self.terms.emission.add(radiance, left.into()),
+            TracedHit::Surface(si) => {
+                let point = self.see_surface(scene, &si, left);
+                lit(self, point);
+            }
+        }
+    }
+
+    /// Adds what a surface emits, and its ambient light, times `weight`.
+    #[inline(always)]
+    fn see_surface(&mut self, scene: &Scene, si: &SurfaceInteraction, weight: f32) -> ShadingPoint {
+        // Evaluate the textures of the material
+        let bsdf = scene.bsdf(si).weighted(weight);
+        self.terms.emission.add(scene.emission(si), weight.into());
+        let point = ShadingPoint::of(si, &bsdf, &scene.ambient);
+        self.terms.ambient += point.base;
+        point
     }
 
     /// Adds the moments of light `index` at a surface: the totals of [`LobeSums`].

@@ -65,8 +65,15 @@ impl<'a> Facing<'a> {
         // The emission in this direction
         let sample = sample()?;
         // Nor does light that an occluder hides
+        let mut left = 1.0;
         if self.light.shadows && point.receives_shadow {
-            if self.scene.occluded(&self.from.ray(self.end, to.l, to.finite)) {
+            let ray = self.from.ray(self.end, to.l, to.finite);
+            if self.scene.occluded_by_opaque(&ray) {
+                return None;
+            }
+            // What surfaces that are not opaque let through
+            left = self.scene.left_by_layers(&ray);
+            if left == 0.0 {
                 return None;
             }
         } else {
@@ -75,6 +82,6 @@ impl<'a> Facing<'a> {
         // Its lobe
         let cos_i = height * sample.inverse_distance;
         let cos_io = point.wo.dot(to.l) * sample.inverse_distance;
-        Some(point.bsdf.lobe.moments(cos_i, self.cos_o, cos_io, sample.weight))
+        Some(point.bsdf.lobe.moments(cos_i, self.cos_o, cos_io, sample.weight * left))
     }
 }

@@ -92,10 +92,10 @@ impl<'a> Shafts<'a> {
                     // Computed again: storing a ray takes longer
                     let (ray, differential) = camera_ray(scene, i * n + column, j * n + row);
                     let hit = self.hits.get([i, j], column, row);
-                    if let Some(point) = pixel.see(scene, scene.see(&ray, hit, &differential)) {
+                    pixel.see_ray(scene, &ray, &differential, hit, |_, point| {
                         self.points.push(Viewpoint::of(&point));
                         self.surfaces.push(point);
-                    }
+                    });
                 }
             }
             *end = self.surfaces.len();

@@ -119,6 +119,7 @@ impl TileFrustum {
                 _ => true,
             }),
             VisibleShape::Trees => geometry.may_meet(scene.level, &self.planes()),
+            VisibleShape::Layers => geometry.may_meet_layers(scene.level, &self.planes()),
         };
         shapes.iter().copied().filter(may_be_hit).collect()
     }
@@ -161,7 +162,7 @@ impl TileFrustum {
                 depths(&|ray| sphere.intersect(ray))?;
                 Some([self.nearest(scene, shape), self.middle_depth(sphere.c)])
             }
-            VisibleShape::Light(_) | VisibleShape::Trees => None,
+            VisibleShape::Light(_) | VisibleShape::Trees | VisibleShape::Layers => None,
         }
     }
 
@@ -229,6 +230,7 @@ impl TileFrustum {
                 Some(_) => f64::NEG_INFINITY,
                 None => f64::INFINITY,
             },
+            VisibleShape::Layers => f64::NEG_INFINITY,
             VisibleShape::Trees => {
                 let (forward, planes) = (self.forward.as_dvec3(), self.planes());
                 let boxes = scene.geometry.tree_bounds().filter(|bounds| planes.may_meet(*bounds));

@@ -24,6 +24,8 @@ pub(crate) enum VisibleShape {
     Light(u32),
     /// Everything in the trees together. It is bounded.
     Trees,
+    /// Everything that is not opaque together.
+    Layers,
 }
 
 /// The material at the center of a square of pixels.
@@ -92,6 +94,7 @@ impl VisibleShape {
         let is_seen = |thing: &u32| geometry.placed[*thing as usize].camera != Opacity::Clear;
         all.extend(geometry.unbounded.iter().copied().filter(is_seen).map(VisibleShape::Plane));
         all.extend(geometry.has_boxes().then_some(VisibleShape::Trees));
+        all.extend(scene.has_layers().then_some(VisibleShape::Layers));
         let visible = |i: &usize| scene.lights[*i].area().is_some_and(|area| area.visible);
         all.extend((0..scene.lights.len()).filter(visible).map(|i| VisibleShape::Light(i as u32)));
         all
@@ -117,7 +120,7 @@ impl VisibleShape {
             VisibleShape::Plane(i) => scene.geometry.meet_plane(i, ray),
             VisibleShape::Facet(facet) => scene.geometry.facet(facet).intersect(ray),
             VisibleShape::Light(i) => scene.lights[i as usize].area()?.shape.intersect(ray),
-            VisibleShape::Trees => unreachable!("the trees hold many shapes"),
+            VisibleShape::Trees | VisibleShape::Layers => unreachable!("the trees hold many shapes"),
         }
     }
 
@@ -129,7 +132,7 @@ impl VisibleShape {
             VisibleShape::Plane(i) => scene.geometry.placed[i as usize].surface,
             VisibleShape::Facet(facet) => scene.geometry.facet_surface(facet),
             VisibleShape::Light(i) => SurfaceId(scene.geometry.surfaces.len() as u32 + i),
-            VisibleShape::Trees => unreachable!("the trees hold many shapes"),
+            VisibleShape::Trees | VisibleShape::Layers => unreachable!("the trees hold many shapes"),
         }
     }
 
@@ -142,7 +145,7 @@ impl VisibleShape {
             VisibleShape::Plane(i) => At::Placed(i, PlacedSpot::Part(0)),
             VisibleShape::Facet(facet) => scene.geometry.on_facet(facet, ray.o.as_dvec3() + ray.d.as_dvec3() * t),
             VisibleShape::Light(_) => At::Light,
-            VisibleShape::Trees => unreachable!("the trees hold many shapes"),
+            VisibleShape::Trees | VisibleShape::Layers => unreachable!("the trees hold many shapes"),
         };
         Hit { t, surface: self.surface(scene), at }
     }

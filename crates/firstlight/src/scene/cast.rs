@@ -41,7 +41,7 @@ impl Scene {
 
     fn cast_one(&self, ray: &WorldRay) -> Option<CastHit> {
         let (local, way) = self.enter(ray);
-        let hit = self.intersect_local(&local)?;
+        let hit = self.first_shown(&local)?;
         let (t, surface, barycentric) = (hit.t + way, hit.surface, hit.barycentric());
         if let At::Light = hit.at {
             let there = local.o.as_dvec3() + local.d.as_dvec3() * hit.t;
@@ -58,7 +58,8 @@ impl Scene {
     }
 
     /// The share of a light that each of `count` points sees, 0 to 1, on all threads: the share of its
-    /// [points](Self::light_points) to which nothing stands in the way.
+    /// [points](Self::light_points) to which nothing stands in the way; one behind
+    /// something that is not opaque counts in part.
     ///
     /// `point(i)` is a place in world space and, if it lies on a surface, the unit normal there: what is below its
     /// horizon is not seen, and the surface itself is not in the way.
@@ -81,16 +82,16 @@ impl Scene {
             let sees = |k: usize| {
                 let to = from.towards(k, p);
                 if normal.is_some_and(|n| !(n.dot(to.l) > floor)) {
-                    return false;
+                    return 0.0;
                 }
                 // Of a place without a normal, what it may lie on is left in the direction of the light
                 let away = normal.unwrap_or_else(|| to.l.normalize_or_zero());
                 let start = error.offset(p, away).as_vec3();
                 let t_max = if to.finite { 1.0 } else { f32::INFINITY };
-                !self.occluded(&ShadowRay { p, error, start, l: to.l, t_max, to: end, but: Facet::NONE })
+                self.transmittance(&ShadowRay { p, error, start, l: to.l, t_max, to: end, but: Facet::NONE })
             };
             let all = from.samples();
-            (0..all).filter(|k| sees(*k)).count() as f32 / all as f32
+            (0..all).map(|k| f64::from(sees(k))).sum::<f64>() as f32 / all as f32
         })
     }
 }

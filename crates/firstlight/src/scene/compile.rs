@@ -112,10 +112,10 @@ impl SceneDesc {
         let materials = self.compile_materials(cx, &mut textures);
         let textures = textures.finish(cx);
         let mut files = MeshFiles { cache, ..MeshFiles::default() };
-        let geometry = compile_shapes(self, cx, assets, &mut files);
+        let geometry = compile_shapes(self, &materials, cx, assets, &mut files);
         let origin = cx.origin;
         let bounds = geometry.as_ref().and_then(Geometry::bounds).map(|bounds| bounds.map(|corner| corner + origin));
-        let added = self.complete(cx, assets, options, geometry.as_ref());
+        let added = self.complete(cx, assets, options, &materials, geometry.as_ref());
         let desc = &*self.with(&added);
         let camera = desc.compile_camera(cx, picture.width, picture.height, geometry.is_some());
         let lights = desc.compile_lights(cx);
@@ -177,6 +177,7 @@ impl SceneDesc {
         cx: &mut CompileContext,
         assets: &dyn Assets,
         options: &CompileOptions,
+        materials: &[Material],
         geometry: Option<&Geometry>,
     ) -> Added {
         let Framing { view, margin } = options.framing;
@@ -190,7 +191,7 @@ impl SceneDesc {
         let still = if self.cameras.is_empty() && cx.keyed && options.time != 0.0 {
             let mut at_zero = CompileContext::at_time(0.0);
             let files = &mut MeshFiles { cache: options.cache.as_ref(), ..MeshFiles::default() };
-            compile_shapes(self, &mut at_zero, assets, files).map(|still| (still, at_zero.origin))
+            compile_shapes(self, materials, &mut at_zero, assets, files).map(|still| (still, at_zero.origin))
         } else {
             None
         };

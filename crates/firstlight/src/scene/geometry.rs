@@ -17,6 +17,7 @@ use super::links::{LinkId, LinkSets};
 use super::occluders::Opacity;
 use crate::accel::{Aabb, Bvh};
 use crate::ids::{LightId, MaterialId, SurfaceId};
+use crate::material::Material;
 use crate::math::{DAffine3, DVec3, Facet, Ray, Vec2};
 use crate::shape::{
     Mesh, Parallelogram, Placement, PointSet, ShadowTerminator, Solid, Sphere, TrianglePoint, UnboundedPlane,
@@ -100,6 +101,50 @@ pub(crate) struct Placed {
     /// To camera rays, and to light.
     pub camera: Opacity,
     pub shadow: Opacity,
+    /// Whether it is a layer: see [`Layers`].
+    pub layered: bool,
+}
+
+/// What of a material decides which rays end at its surfaces.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct MaterialRules {
+    /// For each material whether it is not opaque; empty if all are.
+    layered: Vec<bool>,
+    /// For each material whether camera rays pass through from behind; empty if they do through none.
+    single_sided: Vec<bool>,
+}
+
+impl MaterialRules {
+    pub fn new(materials: &[Material]) -> MaterialRules {
+        let each = |is: fn(&Material) -> bool| match materials.iter().any(is) {
+            true => materials.iter().map(is).collect(),
+            false => Vec::new(),
+        };
+        MaterialRules {
+            layered: each(|material| material.common.alpha.is_some()),
+            single_sided: each(|material| material.common.single_sided),
+        }
+    }
+
+    /// Whether surfaces of a material are layers.
+    pub fn is_layered(&self, material: MaterialId) -> bool {
+        self.layered.get(material.index()).is_some_and(|is| *is)
+    }
+
+    /// Whether camera rays pass from behind through surfaces of a material.
+    pub fn is_single_sided(&self, material: MaterialId) -> bool {
+        self.single_sided.get(material.index()).is_some_and(|is| *is)
+    }
+}
+
+/// Where the surfaces are that are not opaque. They lie in no other tree and in no list, so that what is known of
+/// those is known of opaque things alone.
+pub(crate) struct Layers {
+    pub items: Vec<UpperItem>,
+    /// Over the boxes of `items`.
+    pub upper: Bvh,
+    /// What has no box: planes.
+    pub unbounded: Vec<u32>,
 }
 
 /// Where on a surface a ray ended. In whole words: such a value is copied for every camera ray, and the compiler's own
@@ -187,8 +232,10 @@ pub(crate) enum UpperItem {
 /// A shape of the world, and which surface it is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Owned<T> {
-    /// Whether camera rays see it: a copy of what its surface says.
+    /// Whether camera rays end there: it is visible and no layer.
     pub seen: bool,
+    /// Whether it is a layer: see [`Layers`].
+    pub layered: bool,
     pub shape: T,
     pub surface: SurfaceId,
 }
@@ -218,6 +265,9 @@ pub(crate) struct Geometry {
     pub items: Vec<UpperItem>,
     /// Over the boxes of `items`.
     pub upper: Bvh,
+    /// What is not opaque; `None` if all is.
+    pub layers: Option<Layers>,
+    pub rules: MaterialRules,
     /// Where light is gathered on meshes with smooth normals.
     pub terminator: ShadowTerminator,
     /// The sets of lights that surfaces choose.
@@ -248,6 +298,7 @@ pub(crate) struct Parts {
     pub point_sets: Vec<Arc<PointSet>>,
     pub solids: Vec<Solid>,
     pub links: LinkSets,
+    pub rules: MaterialRules,
 }
 
 /// Leaves out what has the key of something before it.
@@ -310,23 +361,31 @@ impl Geometry {
             point_sets,
             solids,
             links,
+            rules: of_materials,
         } = parts;
         if spheres.len() + parallelograms.len() > LISTED {
             let rules = |surface: SurfaceId| surfaces[surface.index()].ray_rules();
-            drop_copies(&mut spheres, |s| (s.shape.place_bits(), s.shape.single_sided, rules(s.surface)));
-            drop_copies(&mut parallelograms, |f| (f.shape.place_bits(), f.shape.single_sided, rules(f.surface)));
+            let own = |layered: bool, surface: SurfaceId| layered.then_some(surface);
+            drop_copies(&mut spheres, |s| {
+                (s.shape.place_bits(), s.shape.single_sided, rules(s.surface), own(s.layered, s.surface))
+            });
+            drop_copies(&mut parallelograms, |f| {
+                (f.shape.place_bits(), f.shape.single_sided, rules(f.surface), own(f.layered, f.surface))
+            });
         }
         let listed = spheres.len() + parallelograms.len() <= LISTED;
         let (mut items, mut boxes, mut unbounded) = (Vec::new(), Vec::new(), Vec::new());
-        if !listed {
-            for (i, sphere) in spheres.iter().enumerate() {
-                items.push(UpperItem::Sphere(i as u32));
-                boxes.push(widened(sphere.shape.bounds()));
-            }
-            for (i, flat) in parallelograms.iter().enumerate() {
-                items.push(UpperItem::Parallelogram(i as u32));
-                boxes.push(widened(flat.shape.bounds()));
-            }
+        let (mut layers, mut layer_boxes, mut unbounded_layers) = (Vec::new(), Vec::new(), Vec::new());
+        for (i, sphere) in spheres.iter().enumerate().filter(|(_, sphere)| sphere.layered || !listed) {
+            let (items, boxes) =
+                if sphere.layered { (&mut layers, &mut layer_boxes) } else { (&mut items, &mut boxes) };
+            items.push(UpperItem::Sphere(i as u32));
+            boxes.push(widened(sphere.shape.bounds()));
+        }
+        for (i, flat) in parallelograms.iter().enumerate().filter(|(_, flat)| flat.layered || !listed) {
+            let (items, boxes) = if flat.layered { (&mut layers, &mut layer_boxes) } else { (&mut items, &mut boxes) };
+            items.push(UpperItem::Parallelogram(i as u32));
+            boxes.push(widened(flat.shape.bounds()));
         }
         for (i, thing) in placed.iter().enumerate() {
             let own = match thing.target {
@@ -338,6 +397,11 @@ impl Geometry {
                 PlacedTarget::Solid(solid) => solids[solid as usize].bounds(),
             };
             match own {
+                Some(own) if thing.layered => {
+                    layers.push(UpperItem::Placed(i as u32));
+                    layer_boxes.push(widened(thing.placement.bounds(own)));
+                }
+                None if thing.layered => unbounded_layers.push(i as u32),
                 Some(own) => {
                     items.push(UpperItem::Placed(i as u32));
                     boxes.push(widened(thing.placement.bounds(own)));
@@ -352,6 +416,9 @@ impl Geometry {
             _ => Ok(item),
         };
         let upper = Bvh::build_distinct(&boxes, key);
+        let is_layered = !layers.is_empty() || !unbounded_layers.is_empty();
+        let layers =
+            is_layered.then(|| Layers { items: layers, upper: Bvh::build(&layer_boxes), unbounded: unbounded_layers });
         let mut geometry = Geometry {
             surfaces,
             spaces,
@@ -367,6 +434,8 @@ impl Geometry {
             unbounded,
             items,
             upper,
+            layers,
+            rules: of_materials,
             terminator,
             links,
             rounding: 0.0,
@@ -377,7 +446,8 @@ impl Geometry {
 
     /// The largest coordinate of what any shape is described by.
     fn largest_coordinate(&self) -> f64 {
-        let planes = self.unbounded.iter().filter_map(|thing| {
+        let layers = self.layers.iter().flat_map(|layers| &layers.unbounded);
+        let planes = self.unbounded.iter().chain(layers).filter_map(|thing| {
             let Placed { placement, target: PlacedTarget::Solid(solid), .. } = &self.placed[*thing as usize] else {
                 return None;
             };
@@ -455,7 +525,8 @@ impl Geometry {
         let mesh_trees: usize = self.all_meshes().map(|mesh| mesh.tree.bytes()).sum();
         let point_trees: usize = self.point_sets.iter().map(|points| points.tree_bytes()).sum();
         let placed = size_of_val(self.placed.as_slice()) + size_of_val(self.items.as_slice());
-        [(meshes + points) as u64, (mesh_trees + point_trees + self.upper.bytes() + placed) as u64]
+        let upper = self.upper.bytes() + self.layers.as_ref().map_or(0, |layers| layers.upper.bytes());
+        [(meshes + points) as u64, (mesh_trees + point_trees + upper + placed) as u64]
     }
 
     /// The box around something placed, in its own space; `None` if it is empty or has no end.

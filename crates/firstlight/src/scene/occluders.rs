@@ -68,11 +68,14 @@ impl ListedOccluders {
         let mut listed = ListedOccluders::default();
         if geometry.listed {
             let opacity = |surface: SurfaceId| geometry.surfaces[surface.index()].opacity();
-            let is_clear = |surface: SurfaceId| opacity(surface) == Opacity::Clear;
-            for Owned { shape, surface, .. } in geometry.spheres.iter().filter(|owned| !is_clear(owned.surface)) {
+            let stops = |layered: bool, surface: SurfaceId| !layered && opacity(surface) != Opacity::Clear;
+            for Owned { shape, surface, .. } in
+                geometry.spheres.iter().filter(|owned| stops(owned.layered, owned.surface))
+            {
                 listed.spheres.push(Listed { shape: *shape, opacity: opacity(*surface) });
             }
-            for Owned { shape, surface, seen } in geometry.parallelograms.iter().filter(|own| !is_clear(own.surface)) {
+            let flats = geometry.parallelograms.iter().filter(|owned| stops(owned.layered, owned.surface));
+            for Owned { shape, surface, seen, .. } in flats {
                 listed.flats.push(Listed { shape: *shape, opacity: opacity(*surface) });
                 listed.flats_seen.push(*seen);
             }

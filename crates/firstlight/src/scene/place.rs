@@ -10,13 +10,16 @@ use std::sync::Arc;
 use glam::DAffine3;
 
 use super::SceneDesc;
-use super::geometry::{Geometry, Joined, ObjectSpace, Owned, Parts, Placed, PlacedTarget, RayRules, Surface};
+use super::geometry::{
+    Geometry, Joined, MaterialRules, ObjectSpace, Owned, Parts, Placed, PlacedTarget, RayRules, Surface,
+};
 use super::links::{LinkId, Links};
 use super::occluders::Opacity;
 use crate::context::{Assets, CompileContext};
 use crate::describe::Family;
 use crate::describe::node::quoted;
 use crate::ids::{MaterialId, SurfaceId};
+use crate::material::Material;
 use crate::math::{DVec3, origin_for, origin_of_view};
 use crate::shape::{
     Common, CompileCache, Mesh, MeshBuilder, MeshFiles, MeshSource, Parallelogram, Placement, PointSet, ShapeDesc,
@@ -97,19 +100,25 @@ enum Form {
 /// A group, or the scene itself, in its own space.
 struct GroupSpace {
     leaves: Vec<PlacedShape>,
-    /// All its meshes, to be joined.
-    builder: MeshBuilder,
+    /// All its meshes, to be joined: what of them is opaque, and what is not.
+    builders: [MeshBuilder; 2],
     /// All its meshes, joined, once it is known where they count from.
-    mesh: Option<Arc<Mesh>>,
-    /// Where `mesh` counts from, in the space of the group.
+    meshes: [Option<Arc<Mesh>>; 2],
+    /// Where `meshes` count from, in the space of the group.
     origin: DVec3,
 }
 
 impl GroupSpace {
     /// Joins the meshes; they count from `origin`.
     fn join(&mut self, cx: &CompileContext, cache: Option<&CompileCache>, origin: DVec3) {
-        self.mesh = std::mem::take(&mut self.builder).build(cx, cache, origin);
+        self.meshes = std::mem::take(&mut self.builders).map(|builder| builder.build(cx, cache, origin));
         self.origin = origin;
+    }
+
+    /// The box around all meshes.
+    fn mesh_bounds(&self) -> Option<[DVec3; 2]> {
+        let bounds = self.builders.iter().filter_map(MeshBuilder::bounds);
+        bounds.reduce(|[low, high], [a, b]| [low.min(a), high.max(b)])
     }
 }
 
@@ -125,7 +134,7 @@ struct Extents<'a> {
 impl Extents<'_> {
     /// The box around all of a group that has an end, in its own space. Groups are without circles and not deep.
     fn of(&mut self, group: &GroupSpace) -> Option<[DVec3; 2]> {
-        let mut all = group.builder.bounds();
+        let mut all = group.mesh_bounds();
         for leaf in &group.leaves {
             let own = match &leaf.form {
                 Form::Nothing | Form::MeshPart => None,
@@ -224,6 +233,7 @@ impl Over {
 /// Compiles all shapes of a scene. `None` after an error.
 pub(super) fn compile_shapes(
     desc: &SceneDesc,
+    compiled: &[Material],
     cx: &mut CompileContext,
     assets: &dyn Assets,
     files: &mut MeshFiles<'_>,
@@ -233,8 +243,10 @@ pub(super) fn compile_shapes(
     let materials = MaterialNames::new(desc);
     // The first of a name; a second one is a fault of the text
     let group_ids = desc.groups.iter().enumerate().rev().map(|(id, (name, _))| (name.as_str(), id)).collect();
+    let rules = MaterialRules::new(compiled);
     let mut compiler = Compiler {
         desc,
+        rules: &rules,
         materials,
         group_ids,
         links: Links::new(&desc.lights),
@@ -266,26 +278,30 @@ pub(super) fn compile_shapes(
     let of_shapes = bounds.map_or(DVec3::ZERO, origin_for);
     cx.origin = desc.line_of_sight().map_or(of_shapes, |[eye, target]| origin_of_view(of_shapes, eye, target));
     for group in &mut groups {
-        group.join(cx, cache, group.builder.bounds().map_or(DVec3::ZERO, origin_for));
+        group.join(cx, cache, group.mesh_bounds().map_or(DVec3::ZERO, origin_for));
     }
     root.join(cx, cache, cx.origin);
     if cx.error_count() > before {
         return None;
     }
-    let meshes: Vec<&Mesh> = groups.iter().filter_map(|group| group.mesh.as_deref()).collect();
-    let mut count = 0;
-    let mesh_of = groups.iter().map(|group| {
-        group.mesh.as_ref().map(|_| {
-            count += 1;
-            count - 1
-        })
-    });
-    let mesh_of = mesh_of.collect();
-    let parts = Parts { solids, point_sets, ..Parts::default() };
-    let mut walk = SceneWalk { groups: &groups, meshes, mesh_of, parts, links, name_bytes: 0 };
+    // The layered mesh of the scene itself is placed like those of groups, and comes after them
+    let [world, layered] = std::mem::take(&mut root.meshes);
+    let mut meshes: Vec<Arc<Mesh>> = Vec::new();
+    let mut number = |mesh: &Option<Arc<Mesh>>| {
+        let mesh = mesh.as_ref()?;
+        meshes.push(mesh.clone());
+        Some(meshes.len() as u32 - 1)
+    };
+    let mesh_of = groups.iter().map(|group| group.meshes.each_ref().map(&mut number)).collect();
+    let layered = number(&layered);
+    let parts = Parts { solids, point_sets, meshes, rules, ..Parts::default() };
+    let mut walk = SceneWalk { groups: &groups, mesh_of, parts, links, name_bytes: 0 };
     let scene_from_world = DAffine3 { translation: -cx.origin, ..DAffine3::IDENTITY };
     let is_shifted = cx.origin != DVec3::ZERO;
     walk.group(&root, None, if is_shifted { scene_from_world } else { DAffine3::IDENTITY }, &Over::NONE);
+    if let Some(mesh) = layered {
+        walk.place(DAffine3::IDENTITY, PlacedTarget::Mesh(mesh), SurfaceId(0), true);
+    }
     let SceneWalk { mut parts, links, name_bytes, .. } = walk;
     if name_bytes > MAX_NAMES {
         let message = format!("the names of what the instances place have more than {MAX_NAMES} bytes");
@@ -296,9 +312,8 @@ pub(super) fn compile_shapes(
     if cx.error_count() > before {
         return None;
     }
-    parts.meshes = groups.into_iter().filter_map(|group| group.mesh).collect();
-    parts.world = root.mesh.map(|mesh| {
-        let (camera, shadow) = opacities(&parts.surfaces, 0, &mesh);
+    parts.world = world.map(|mesh| {
+        let (camera, shadow) = opacities(&parts.surfaces, &parts.rules, 0, &mesh);
         Joined { mesh, camera, shadow }
     });
     Some(Geometry::new(parts, desc.render.shadow_terminator))
@@ -306,6 +321,7 @@ pub(super) fn compile_shapes(
 
 struct Compiler<'a, 'c> {
     desc: &'a SceneDesc,
+    rules: &'a MaterialRules,
     materials: MaterialNames<'a>,
     /// Groups by name.
     group_ids: HashMap<&'a str, usize>,
@@ -315,29 +331,35 @@ struct Compiler<'a, 'c> {
     solids: Vec<Solid>,
     point_sets: Vec<Arc<PointSet>>,
     /// Numbers for what surfaces say of rays.
-    classes: HashMap<RayRules, u32>,
+    classes: HashMap<(RayRules, bool), u32>,
 }
 
 impl Compiler<'_, '_> {
     /// Compiles the shapes of a group, or of the scene, whose paths begin with `prefix`.
     fn group(&mut self, cx: &mut CompileContext, prefix: &str, shapes: &[ShapeDesc]) -> GroupSpace {
         let mut leaves: Vec<PlacedShape> = Vec::with_capacity(shapes.len());
-        let mut mesh = MeshBuilder::default();
+        let mut meshes = [MeshBuilder::default(), MeshBuilder::with_copies()];
         // Scene order: kind by kind, in each the order of the text
         for (kind, word) in ShapeDesc::KINDS.iter().enumerate() {
             let of_kind = shapes.iter().filter(|shape| shape.kind_index() == kind);
             for (i, shape) in of_kind.enumerate() {
                 let leaf = cx.within(&format!("{prefix}{word}[{i}]"), |cx| {
                     let number = leaves.len() as u32;
-                    self.leaf(cx, shape, number, &mut mesh)
+                    self.leaf(cx, shape, number, &mut meshes)
                 });
                 leaves.push(leaf);
             }
         }
-        GroupSpace { leaves, builder: mesh, mesh: None, origin: DVec3::ZERO }
+        GroupSpace { leaves, builders: meshes, meshes: [None, None], origin: DVec3::ZERO }
     }
 
-    fn leaf(&mut self, cx: &mut CompileContext, shape: &ShapeDesc, number: u32, mesh: &mut MeshBuilder) -> PlacedShape {
+    fn leaf(
+        &mut self,
+        cx: &mut CompileContext,
+        shape: &ShapeDesc,
+        number: u32,
+        meshes: &mut [MeshBuilder; 2],
+    ) -> PlacedShape {
         let common = shape.common();
         let Common { name, material, transform, visible, casts_shadow, receives_shadow, single_sided, .. } = common;
         let Common { lights, shadows, .. } = common;
@@ -380,7 +402,7 @@ impl Compiler<'_, '_> {
                     let faces = self.face_materials(cx, &source, desc.file.is_some(), named);
                     surface.material = if let [one] = faces[..] { Some(one) } else { None };
                     let class = self.class(&surface);
-                    mesh.add(cx, source, transform, number, class, faces);
+                    self.add_mesh(cx, source, meshes, transform, [number, class], faces);
                     Form::MeshPart
                 }
                 None => Form::Nothing,
@@ -400,7 +422,35 @@ impl Compiler<'_, '_> {
     /// A number for what a surface says of rays: of shapes at the same place, those of one number are the same to them.
     fn class(&mut self, surface: &Surface) -> u32 {
         let next = self.classes.len() as u32;
-        *self.classes.entry(surface.ray_rules()).or_insert(next)
+        let single_sided = surface.material.is_some_and(|material| self.rules.is_single_sided(material));
+        *self.classes.entry((surface.ray_rules(), single_sided)).or_insert(next)
+    }
+
+    /// Adds a mesh of such a number and class to those that are opaque, or to those that are not; where its faces
+    /// differ, a part to each.
+    fn add_mesh(
+        &self,
+        cx: &mut CompileContext,
+        source: MeshSource,
+        meshes: &mut [MeshBuilder; 2],
+        transform: Option<DAffine3>,
+        [number, class]: [u32; 2],
+        faces: Vec<MaterialId>,
+    ) {
+        let layered: Vec<bool> = faces.iter().map(|material| self.rules.is_layered(*material)).collect();
+        let sided = |material: &MaterialId| self.rules.is_single_sided(*material);
+        if faces.iter().any(|material| sided(material) != sided(&faces[0])) {
+            meshes[0].keeps_copies = true;
+        }
+        if layered.iter().all(|is| *is == layered[0]) {
+            return meshes[usize::from(layered[0])].add(cx, source, transform, number, class, faces);
+        }
+        for (of_layers, mesh) in [false, true].into_iter().zip(meshes) {
+            let part = source.part(|face| layered[face as usize] == of_layers);
+            if !part.data.triangles.is_empty() {
+                mesh.add(cx, part, transform, number, class, faces.clone());
+            }
+        }
     }
 
     /// What the triangles of a mesh choose from: one material for all, or one for each name of the file.
@@ -511,10 +561,8 @@ fn count_things(group: &GroupSpace, groups: &[GroupSpace], known: &mut [Option<u
 /// Walks a scene through all its instances.
 struct SceneWalk<'a> {
     groups: &'a [GroupSpace],
-    /// The meshes of the groups that have one.
-    meshes: Vec<&'a Mesh>,
-    /// Which of them each group has.
-    mesh_of: Vec<Option<u32>>,
+    /// The opaque and the layered mesh of each group, as indices of all meshes.
+    mesh_of: Vec<[Option<u32>; 2]>,
     parts: Parts,
     links: Links,
     /// Bytes of the names of surfaces within instances.
@@ -534,14 +582,23 @@ impl SceneWalk<'_> {
         }
         let first = self.parts.surfaces.len() as u32;
         let surfaces = group.leaves.iter().filter(|leaf| !matches!(leaf.form, Form::Instance(_)));
-        let links = &mut self.links;
-        self.parts.surfaces.extend(surfaces.map(|leaf| over.surface(&leaf.surface, links)));
+        let (links, rules) = (&mut self.links, &self.parts.rules);
+        self.parts.surfaces.extend(surfaces.map(|leaf| {
+            let mut surface = over.surface(&leaf.surface, links);
+            surface.single_sided |= surface.material.is_some_and(|material| rules.is_single_sided(material));
+            surface
+        }));
         let own_space = self.parts.spaces.len() as u32;
         self.parts.spaces.push(ObjectSpace { scene_from_object: world_from_group, instance: over.instance });
         for (i, leaf) in group.leaves.iter().enumerate() {
             let world = leaf.transform.map_or(world_from_group, |transform| world_from_group * transform);
             let surface = SurfaceId(first + i as u32);
-            let seen = over.visible && leaf.surface.visible;
+            let own =
+                if matches!(leaf.form, Form::Instance(_)) { None } else { self.parts.surfaces.get(surface.index()) };
+            let layered =
+                own.and_then(|own| own.material).is_some_and(|material| self.parts.rules.is_layered(material));
+            let single_sided = own.is_some_and(|own| own.single_sided);
+            let seen = over.visible && leaf.surface.visible && !layered;
             if !matches!(leaf.form, Form::Instance(_)) {
                 let space = if leaf.transform.is_some() { self.parts.spaces.len() as u32 } else { own_space };
                 if leaf.transform.is_some() {
@@ -553,24 +610,24 @@ impl SceneWalk<'_> {
                 Form::Nothing | Form::MeshPart => {}
                 Form::Sphere(sphere) => match sphere.moved(&world) {
                     Some(mut shape) => {
-                        shape.single_sided |= over.single_sided;
-                        self.parts.spheres.push(Owned { seen, shape, surface });
+                        shape.single_sided |= single_sided;
+                        self.parts.spheres.push(Owned { seen, layered, shape, surface });
                     }
                     None => {
                         self.parts.solids.push(Solid::Ball(sphere.ball()));
                         let target = PlacedTarget::Solid(self.parts.solids.len() as u32 - 1);
-                        self.place(world * sphere.world_from_ball(), target, surface);
+                        self.place(world * sphere.world_from_ball(), target, surface, layered);
                     }
                 },
                 Form::Parallelogram(flat) => {
                     let mut shape = flat.moved(&world);
-                    shape.single_sided |= over.single_sided;
-                    self.parts.parallelograms.push(Owned { seen, shape, surface });
+                    shape.single_sided |= single_sided;
+                    self.parts.parallelograms.push(Owned { seen, layered, shape, surface });
                 }
-                Form::Solid(solid) => self.place(world, PlacedTarget::Solid(*solid), surface),
+                Form::Solid(solid) => self.place(world, PlacedTarget::Solid(*solid), surface, layered),
                 Form::Points(points) => {
                     let origin = self.parts.point_sets[*points as usize].origin();
-                    self.place(from(world, origin), PlacedTarget::Points(*points), surface);
+                    self.place(from(world, origin), PlacedTarget::Points(*points), surface, layered);
                 }
                 Form::Instance(of) => {
                     let groups = self.groups;
@@ -584,21 +641,28 @@ impl SceneWalk<'_> {
             }
         }
         // The mesh of the scene itself is in the world already
-        if let Some(mesh) = index.and_then(|index| self.mesh_of[index]) {
-            self.place(from(world_from_group, group.origin), PlacedTarget::Mesh(mesh), SurfaceId(first));
+        let Some(meshes) = index.map(|index| self.mesh_of[index]) else { return };
+        for (mesh, of_layers) in meshes.into_iter().zip([false, true]) {
+            // One material for all in an instance says it for all
+            let layered = over.material.map_or(of_layers, |material| self.parts.rules.is_layered(material));
+            if let Some(mesh) = mesh {
+                let world = from(world_from_group, group.origin);
+                self.place(world, PlacedTarget::Mesh(mesh), SurfaceId(first), layered);
+            }
         }
     }
 
-    fn place(&mut self, world_from_object: DAffine3, target: PlacedTarget, surface: SurfaceId) {
+    fn place(&mut self, world_from_object: DAffine3, target: PlacedTarget, surface: SurfaceId, layered: bool) {
+        let Parts { surfaces, rules, meshes, .. } = &self.parts;
         let (camera, shadow) = match target {
-            PlacedTarget::Mesh(mesh) => opacities(&self.parts.surfaces, surface.0, self.meshes[mesh as usize]),
+            PlacedTarget::Mesh(mesh) => opacities(surfaces, rules, surface.0, &meshes[mesh as usize]),
             PlacedTarget::Points(_) | PlacedTarget::Solid(_) => {
-                let own = &self.parts.surfaces[surface.index()];
+                let own = &surfaces[surface.index()];
                 (if own.visible { Opacity::Opaque } else { Opacity::Clear }, own.opacity())
             }
         };
         let placement = Placement::new(world_from_object);
-        self.parts.placed.push(Placed { placement, target, surface, camera, shadow });
+        self.parts.placed.push(Placed { placement, target, surface, camera, shadow, layered });
     }
 }
 
@@ -611,15 +675,20 @@ fn from(transform: DAffine3, origin: DVec3) -> DAffine3 {
 }
 
 /// How opaque a mesh whose surfaces start at `first` is: to camera rays, and to light.
-fn opacities(surfaces: &[Surface], first: u32, mesh: &Mesh) -> (Opacity, Opacity) {
+fn opacities(surfaces: &[Surface], rules: &MaterialRules, first: u32, mesh: &Mesh) -> (Opacity, Opacity) {
     let own = || mesh.parts.iter().map(|part| &surfaces[(first + part.surface) as usize]);
     let of = |all: bool, any: bool| match (all, any) {
         (true, _) => Opacity::Opaque,
         (false, true) => Opacity::Mixed,
         (false, false) => Opacity::Clear,
     };
+    let passes = |material: &MaterialId| rules.is_single_sided(*material);
+    let faces_pass = mesh
+        .parts
+        .iter()
+        .any(|part| surfaces[(first + part.surface) as usize].material.is_none() && part.materials.iter().any(passes));
     (
-        of(own().all(|s| s.visible && !s.single_sided), own().any(|s| s.visible)),
+        of(own().all(|s| s.visible && !s.single_sided) && !faces_pass, own().any(|s| s.visible)),
         of(own().all(|s| s.opacity() == Opacity::Opaque), own().any(|s| s.opacity() != Opacity::Clear)),
     )
 }

@@ -25,7 +25,7 @@ impl ShadowRays<'_> {
         &self.from[lane.min(self.from.len() - 1)]
     }
 
-    fn ray(&self, lane: usize) -> ShadowRay {
+    pub fn ray(&self, lane: usize) -> ShadowRay {
         ShadowRay { l: self.rays.d(lane), ..*self.origin(lane) }
     }
 
@@ -118,7 +118,7 @@ impl<'a> ShadowMesh<'a> {
     /// Whether a ray starts on a triangle, which does not block it then: on its own facet, or in the plane of another,
     /// as far as rounding allows to tell. `o` is the start in the space of the mesh.
     #[inline(never)]
-    fn is_start(&self, ray: &ShadowRay, o: Vec3, triangle: u32) -> bool {
+    pub(super) fn is_start(&self, ray: &ShadowRay, o: Vec3, triangle: u32) -> bool {
         let error = || self.placement.map_or(ray.error.0.as_dvec3(), |placement| placement.error_in_object(ray.error));
         ray.but.of(self.source) == triangle || self.mesh.is_in_plane(triangle, o, error())
     }

@@ -30,6 +30,7 @@ impl Scene {
                 found(SurfaceId(first_light + light));
             }
         });
+        self.meet_all_layers(ray, &mut found);
         if geometry.has_trees() {
             geometry.meet_all(self.level, ray, &RefCell::new(&mut found));
         }

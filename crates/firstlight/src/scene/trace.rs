@@ -103,10 +103,16 @@ impl Scene {
         self.lights[light.index()].samples()
     }
 
-    /// Whether anything that casts shadows for the ray's light stands between a surface and it. Any hit will do, so the
-    /// order is of no account.
+    /// Whether all of the light along a ray is stopped between a surface and the ray's light: nothing is left of it by
+    /// what casts shadows for that light. See [`transmittance`](Self::transmittance).
     #[inline]
     pub fn occluded(&self, ray: &ShadowRay) -> bool {
+        self.occluded_by_opaque(ray) || self.left_by_layers(ray) == 0.0
+    }
+
+    /// Whether anything opaque stops the light. Any hit will do, so the order is of no account.
+    #[inline]
+    pub(crate) fn occluded_by_opaque(&self, ray: &ShadowRay) -> bool {
         self.occluded_by_lists(ray) || self.geometry.has_trees() && self.geometry.is_blocked(self.level, ray)
     }
 
@@ -166,7 +172,7 @@ impl Scene {
     ) -> SurfaceInteraction {
         let surface = &self.geometry.surfaces[hit.surface.index()];
         let point = self.geometry.point(ray, hit, differential, terminator);
-        let ShapePoint { p, error, normal, shading, lifted, uv, footprint, color } = point;
+        let ShapePoint { p, error, normal, shading, lifted, uv, footprint, color, alpha } = point;
         let error = error.widened(self.geometry.rounding);
         let wo = -ray.d;
         let (ng, ns) = if normal.dot(wo) < 0.0 { (-normal, -shading) } else { (normal, shading) };
@@ -190,6 +196,7 @@ impl Scene {
             uv,
             footprint,
             color,
+            alpha,
             surface,
             material,
             receives_shadow,

@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 use fearless_simd::{Level, prelude::*};
 
-use super::geometry::{At, Geometry, Hit, Nearest, Placed, PlacedSpot, PlacedTarget, UpperItem};
+use super::geometry::{At, Geometry, Hit, Layers, Nearest, Placed, PlacedSpot, PlacedTarget, UpperItem};
 use super::occluders::Opacity;
 use crate::accel::{Aabb, Planes, RayTile, TraceRay, dispatch_eight};
 use crate::ids::{MaterialId, SurfaceId};
@@ -47,6 +47,36 @@ impl Geometry {
     #[inline(always)]
     pub fn has_boxes(&self) -> bool {
         self.world.is_some() || !self.items.is_empty()
+    }
+
+    /// Whether any light has to be sampled past anything but what is listed: past what [has boxes](Self::has_boxes), or
+    /// is not opaque.
+    #[inline(always)]
+    pub fn is_sampled_past(&self) -> bool {
+        self.has_boxes() || self.layers.is_some()
+    }
+
+    /// Whether camera rays inside of `planes` may meet anything that is not opaque.
+    pub fn may_meet_layers(&self, level: Level, planes: &Planes) -> bool {
+        self.layers.as_ref().is_some_and(|layers| {
+            let has_none = dispatch_eight!(level, simd => self.has_no_layer_within(simd, layers, planes));
+            !layers.unbounded.is_empty() || !has_none
+        })
+    }
+
+    /// Whether no box in the trees of layers is within `planes`.
+    #[inline(always)]
+    fn has_no_layer_within<S: Simd>(&self, simd: S, layers: &Layers, planes: &Planes) -> bool {
+        let is_within = |center, half| planes.within(center, half).test();
+        layers.upper.gather(simd, is_within, |item| {
+            let UpperItem::Placed(index) = layers.items[item as usize] else { return false };
+            let Placed { placement, target: PlacedTarget::Mesh(mesh), .. } = &self.placed[index as usize] else {
+                return false;
+            };
+            let own = planes.placed(&placement.world_from_object, &placement.object_from_world);
+            let tree = &self.meshes[*mesh as usize].tree;
+            tree.gather(simd, |center, half| own.within(center, half).test(), |_| false)
+        })
     }
 
     /// The boxes around all that lies in trees and has an end.
@@ -314,8 +344,10 @@ impl Geometry {
 
     /// Whether a camera ray ends at a triangle, or passes through.
     pub(super) fn seen(&self, mesh: &Mesh, first: u32, triangle: u32, d: Vec3) -> bool {
-        let surface = &self.surfaces[(first + mesh.part(triangle).surface) as usize];
-        surface.visible && !(surface.single_sided && mesh.is_behind(triangle, d))
+        let part = mesh.part(triangle);
+        let surface = &self.surfaces[(first + part.surface) as usize];
+        let of_face = || surface.material.is_none() && self.rules.is_single_sided(part.material(triangle));
+        surface.visible && !((surface.single_sided || of_face()) && mesh.is_behind(triangle, d))
     }
 
     /// The first triangle on a ray, in the mesh's space. Not inlined: one copy for each instruction set is enough.
@@ -473,7 +505,7 @@ impl Geometry {
     pub fn primitive(&self, hit: &Hit) -> Option<u32> {
         match hit.at {
             At::Placed(_, PlacedSpot::Point(point)) => Some(point),
-            _ => self.triangle(hit).map(|(part, triangle)| triangle - part.first_triangle),
+            _ => self.triangle(hit).map(|(part, triangle)| part.number(triangle)),
         }
     }
 }

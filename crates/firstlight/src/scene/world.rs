@@ -63,9 +63,10 @@ impl Scene {
     }
 
     /// The first surface on a ray that a camera can see; of several at the same distance, the one with the lowest id.
+    /// Surfaces with an alpha of less than one half, and holes of masks, are passed.
     pub fn intersect(&self, ray: &WorldRay) -> Option<Hit> {
         let (local, way) = self.enter(ray);
-        self.intersect_local(&local).map(|hit| Hit { t: hit.t + way, ..hit })
+        self.first_shown(&local).map(|hit| Hit { t: hit.t + way, ..hit })
     }
 
     /// The surface at a hit, turned to the viewer. `differential` is that of the camera ray.
@@ -95,7 +96,8 @@ impl Scene {
     /// What a camera ray ends at.
     pub fn look(&self, ray: &WorldRay, differential: &RayDifferential) -> CameraHit {
         let (ray, _) = self.enter(ray);
-        match self.see(&ray, self.intersect_local(&ray), differential) {
+        let hit = self.shown(&ray, differential, self.intersect_local(&ray));
+        match self.see(&ray, hit, differential) {
             TracedHit::Surface(si) => CameraHit::Surface(self.in_world(si)),
             TracedHit::Emission(color) => CameraHit::Emission(color),
             TracedHit::Background => CameraHit::Background,

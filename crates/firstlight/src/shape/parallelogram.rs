@@ -129,6 +129,11 @@ impl Parallelogram {
         (inside(self.u_axis) && inside(self.v_axis)).then_some(t)
     }
 
+    /// The t at which the line from `o` along `d` meets its plane.
+    pub(crate) fn crossing(&self, o: DVec3, d: DVec3) -> f64 {
+        -self.n.dot(o - self.p) / self.n.dot(d)
+    }
+
     /// Where `ray` meets it at `t`, how sure that is, and the normal there.
     #[inline(always)]
     pub(crate) fn place(&self, ray: &Ray, t: f64) -> (Vec3, ErrorBound, Vec3) {
@@ -161,6 +166,7 @@ impl Parallelogram {
             uv: uv.as_vec2(),
             footprint: Footprint { dx, dy, edges: [UvEdge::Bounded; 2] },
             color: Rgb::WHITE,
+            alpha: 1.0,
         }
     }
 

@@ -97,6 +97,7 @@ impl Placement {
             uv: uv.as_vec2(),
             footprint: Footprint { dx, dy, edges },
             color: Rgb::WHITE,
+            alpha: 1.0,
         }
     }
 

@@ -53,7 +53,7 @@ pub(crate) struct PointSet {
     /// Centre and radius of each.
     spheres: Vec<[f32; 4]>,
     /// Empty, or one for each sphere.
-    colors: Vec<[f32; 3]>,
+    colors: Vec<[f32; 4]>,
     /// What was taken off every centre.
     origin: DVec3,
     tree: Bvh,
@@ -279,8 +279,10 @@ impl PointSet {
         let boxes: Vec<Aabb> = spheres.iter().map(bounds).collect();
         // Of equal spheres the first is the one that is seen
         let tree = Bvh::build_distinct(&boxes, |id| spheres[id as usize].map(|x| (x + 0.0).to_bits()));
-        let colors =
-            data.colors.iter().map(|[r, g, b, _]| [*r, *g, *b].map(|c| if c >= 0.0 { c.min(1e6) } else { 0.0 }));
+        let colors = data.colors.iter().map(|[r, g, b, a]| {
+            let [r, g, b] = [*r, *g, *b].map(|c| if c >= 0.0 { c.min(1e6) } else { 0.0 });
+            [r, g, b, if *a >= 0.0 { a.min(1.0) } else { 0.0 }]
+        });
         PointSet { spheres, colors: colors.collect(), origin: data.origin.into(), tree }
     }
 
@@ -319,6 +321,11 @@ impl PointSet {
         there.map(|sphere| reach(sphere.map(f64::from))).fold(f64::NEG_INFINITY, f64::max)
     }
 
+    /// The colour and the alpha of a sphere.
+    fn color(&self, index: u32) -> [f32; 4] {
+        self.colors.get(index as usize).copied().unwrap_or([1.0; 4])
+    }
+
     fn ball(&self, index: u32) -> PointBall {
         let [x, y, z, r] = self.spheres[index as usize].map(f64::from);
         PointBall { c: DVec3::new(x, y, z), r }
@@ -354,6 +361,25 @@ impl PointSet {
             }
         });
         nearest
+    }
+
+    /// Visits every crossing of a sphere, 0 < t < `limit`, with its t and the number of the sphere, until `hit` says
+    /// so: whether it did. `single_sided`: only where the ray enters.
+    #[inline(never)]
+    pub fn each<S: Simd>(
+        &self,
+        simd: S,
+        ray: &DRay,
+        limit: f32,
+        single_sided: bool,
+        mut hit: impl FnMut(f64, u32) -> bool,
+    ) -> bool {
+        let trace = TraceRay::new(ray.o.as_vec3(), ray.d.as_vec3());
+        self.tree.any(simd, &trace, limit, |index| {
+            let Some([enter, leave]) = self.ball(index).roots(ray) else { return false };
+            let within = |t: f64| t > 0.0 && t < f64::from(limit);
+            within(enter) && hit(enter, index) || !single_sided && within(leave) && hit(leave, index)
+        })
     }
 
     /// Whether any sphere is met between 0 and `limit`.
@@ -422,7 +448,8 @@ impl PointSet {
         });
         let n = outwards.as_vec3();
         let (uv, dx, dy) = equirectangular(n, dpx, dpy);
-        let color = self.colors.get(index as usize).map_or(Rgb::WHITE, |[r, g, b]| Rgb::new(*r, *g, *b));
+        let [r, g, b, alpha] = self.color(index);
+        let color = Rgb::new(r, g, b);
         ShapePoint {
             p,
             error,
@@ -432,6 +459,7 @@ impl PointSet {
             uv,
             footprint: Footprint { dx, dy, edges: [UvEdge::Periodic, UvEdge::Folded] },
             color,
+            alpha,
         }
     }
 

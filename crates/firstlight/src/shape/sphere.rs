@@ -12,7 +12,7 @@ use super::surface::{Footprint, RayDifferential, ShapePoint, UvEdge};
 use crate::color::Rgb;
 use crate::context::CompileContext;
 use crate::describe::words;
-use crate::math::{DVec3, ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3, Vec3x16};
+use crate::math::{DRay, DVec3, ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3, Vec3x16};
 
 words! {
     /// How a point of a sphere becomes a texture coordinate. `n` is the outward unit normal at the point.
@@ -94,6 +94,26 @@ impl Sphere {
         }
     }
 
+    /// Both places at which a ray meets the sphere, `t_min` < t < `t_max`, the nearer one first; only where it enters,
+    /// if that is all that the camera sees.
+    pub(crate) fn crossings(&self, ray: &DRay, [t_min, t_max]: [f64; 2], single_sided: bool) -> [Option<f64>; 2] {
+        let (f, d) = (ray.o - self.c, ray.d);
+        let dd = d.length_squared();
+        let b = -f.dot(d);
+        let nearest = f + d * (b / dd);
+        let discriminant = self.r * self.r - nearest.dot(nearest);
+        if !(discriminant >= 0.0) {
+            return [None; 2];
+        }
+        let root = (discriminant * dd).sqrt();
+        let product = f.dot(f) - self.r * self.r;
+        let q = if b > 0.0 { b + root } else { b - root };
+        let (one, other) = (product / q, q / dd);
+        let (enter, leave) = if b > 0.0 { (one, other) } else { (other, one) };
+        let within = |t: f64| (t > t_min && t < t_max).then_some(t);
+        [within(enter), if single_sided { None } else { within(leave) }]
+    }
+
     /// Where `ray` meets the sphere at `t`, how sure that is, and the normal there.
     #[inline(always)]
     pub(crate) fn place(&self, ray: &Ray, t: f64) -> (Vec3, ErrorBound, Vec3) {
@@ -125,7 +145,7 @@ impl Sphere {
             SphereUv::Angles => [UvEdge::Folded, UvEdge::Folded],
         };
         let footprint = Footprint { dx, dy, edges };
-        ShapePoint { p, error, normal: n, shading: n, lifted: None, uv, footprint, color: Rgb::WHITE }
+        ShapePoint { p, error, normal: n, shading: n, lifted: None, uv, footprint, color: Rgb::WHITE, alpha: 1.0 }
     }
 
     /// How the point that `ray` meets at `t` moves with u and with v.

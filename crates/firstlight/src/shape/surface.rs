@@ -59,6 +59,8 @@ pub(crate) struct ShapePoint {
     pub footprint: Footprint,
     /// Multiplies the colours of the material.
     pub color: Rgb,
+    /// Multiplies its alpha, 0 to 1.
+    pub alpha: f32,
 }
 
 /// A surface seen from one side.
@@ -87,6 +89,8 @@ pub struct SurfaceInteraction {
     pub footprint: Footprint,
     /// Multiplies the colours of the material: linear Rec. 709.
     pub color: Rgb,
+    /// Multiplies the alpha of the material: 0 to 1.
+    pub alpha: f32,
     /// What was hit.
     pub surface: SurfaceId,
     /// Its material.

@@ -63,7 +63,6 @@ impl Texture {
 
     /// Whether a mask is solid at a point of a surface, on its finest level: what light meets.
     #[inline]
-    #[allow(dead_code, reason = "materials with masks come next")]
     pub(crate) fn is_solid(&self, uv: Vec2) -> bool {
         match self {
             Texture::Checkerboard(board) => {
@@ -71,6 +70,19 @@ impl Texture {
                 board.color(uv, &point).r >= 0.5
             }
             Texture::Image(image) => image.is_solid(uv),
+        }
+    }
+
+    /// Its value at a texture coordinate, on its finest level: what light meets.
+    #[inline]
+    pub(crate) fn at(&self, uv: Vec2) -> [f32; 4] {
+        let point = Footprint { dx: Vec2::ZERO, dy: Vec2::ZERO, edges: [UvEdge::Unbounded; 2] };
+        match self {
+            Texture::Checkerboard(board) => {
+                let Rgb { r, g, b } = board.color(uv, &point);
+                [r, g, b, 1.0]
+            }
+            Texture::Image(image) => image.value(uv, &point, 1.0),
         }
     }
 

@@ -124,7 +124,7 @@ impl ClusterVisibility {
         if !clear {
             return None;
         }
-        if !scene.geometry.has_trees() {
+        if !scene.geometry.has_trees() && !scene.has_layers() {
             return Some(Visibility::Full);
         }
         let target = Target::without_samples(light, hull);
@@ -136,7 +136,7 @@ impl ClusterVisibility {
     /// The visibility past what was gathered of the trees.
     fn classify_behind_trees(&self, scene: &Scene, target: &Target, room: f64) -> Option<Visibility> {
         let found = &self.occluders;
-        if found.too_many {
+        if found.too_many || found.layers {
             return None;
         }
         let Aabb { min, max } = target.hull.bounds();

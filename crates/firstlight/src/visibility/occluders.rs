@@ -8,7 +8,7 @@ use super::target::Target;
 use crate::accel::dispatch_all;
 use crate::ids::LightId;
 use crate::scene::{Geometry, MeshNumber, PlacedTarget, Scene, ShadowMesh, UpperItem};
-use crate::shape::{Parallelogram, PlaneSide, Sphere};
+use crate::shape::{Mesh, Parallelogram, PlaneSide, Sphere};
 
 /// A sphere or parallelogram, by its index in the list of occluders or in the upper tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +30,8 @@ pub(crate) struct OccluderList {
     pub others: Vec<u32>,
     /// Whether the trees held more than the cap: the lists from trees are incomplete then, and rays have to be traced.
     pub too_many: bool,
+    /// Whether anything that is not opaque may dim some of the light: it is not among the lists.
+    pub layers: bool,
     /// Placed meshes whose boxes intersect the shaft.
     meshes: Vec<MeshNumber>,
 }
@@ -62,6 +64,7 @@ impl OccluderList {
         self.others.clear();
         self.meshes.clear();
         self.too_many = false;
+        self.layers = false;
     }
 
     /// Whether it holds anything from trees.
@@ -123,6 +126,7 @@ impl OccluderList {
                 self.flats.push((ShapeRef::Listed(i as u32), side));
             }
         }
+        self.layers = layers_within(level, scene, target, &shaft);
         if scene.geometry.has_trees() {
             self.too_many = !dispatch_all!(level, simd => self.gather_trees(simd, scene, target, &shaft, cap));
         }
@@ -194,6 +198,7 @@ impl OccluderList {
     #[inline(never)]
     pub fn gather_in(&mut self, level: Level, scene: &Scene, target: &Target, shaft: &Shaft, cap: usize) {
         self.clear();
+        self.layers = layers_within(level, scene, target, shaft);
         self.too_many = !dispatch_all!(level, simd => self.gather_trees(simd, scene, target, shaft, cap));
     }
 
@@ -232,4 +237,60 @@ impl OccluderList {
             },
         )
     }
+}
+
+/// Whether anything that is not opaque may lie in a shaft, and dim its light.
+fn layers_within(level: Level, scene: &Scene, target: &Target, shaft: &Shaft) -> bool {
+    let geometry = &*scene.geometry;
+    let Some(layers) = &geometry.layers else { return false };
+    let stops = |thing: u32| geometry.stops(geometry.placed[thing as usize].shadow, target.light);
+    if layers.unbounded.iter().any(|thing| stops(*thing)) {
+        return true;
+    }
+    let upright = Shaft { horizon: None, ..*shaft };
+    // Whether all that is found is none
+    let is_clear = dispatch_all!(level, simd => layers.upper.gather(
+        simd,
+        #[inline(always)]
+        |center, half| {
+            let shaft = upright.within(center, half);
+            #[inline(always)]
+            move |simd, node: &_| shaft.meet(simd, node)
+        },
+        |item| match layers.items[item as usize] {
+            UpperItem::Sphere(i) => !geometry.casts(geometry.spheres[i as usize].surface, target.light),
+            UpperItem::Parallelogram(i) => {
+                !geometry.casts(geometry.parallelograms[i as usize].surface, target.light)
+            }
+            UpperItem::Placed(i) if !stops(i) => true,
+            UpperItem::Placed(i) => match geometry.placed[i as usize].target {
+                PlacedTarget::Mesh(mesh) => {
+                    let own = shaft.in_object(&geometry.placed[i as usize].placement, &target.hull);
+                    is_clear_of_mesh(simd, &geometry.meshes[mesh as usize], &own)
+                }
+                PlacedTarget::Points(_) | PlacedTarget::Solid(_) => false,
+            },
+        },
+    ));
+    !is_clear
+}
+
+/// Whether no leaf of a mesh may lie in a shaft of its space.
+#[inline(never)]
+fn is_clear_of_mesh<S: Simd>(simd: S, mesh: &Mesh, shaft: &Shaft) -> bool {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            mesh.tree.gather(
+                simd,
+                #[inline(always)]
+                |center, half| {
+                    let shaft = shaft.within(center, half);
+                    #[inline(always)]
+                    move |simd, node: &_| shaft.meet(simd, node)
+                },
+                |_| false,
+            )
+        },
+    )
 }

@@ -7,7 +7,7 @@ use super::occluders::OccluderList;
 use super::shaft::Shaft;
 use super::target::Target;
 use crate::accel::{Aabb, dispatch_all};
-use crate::math::{DVec3, ErrorBound, UNIT_ROUNDOFF, Vec3};
+use crate::math::{DVec3, ErrorBound, LANES, UNIT_ROUNDOFF, Vec3};
 use crate::scene::{PlacedTarget, Scene, ShadowMesh};
 use crate::shape::{
     Cover, DiskShadow, Eye, LightSeen, ParallelogramShadow, Placement, SeenTriangle, SphereShadow, TOGETHER,
@@ -39,8 +39,12 @@ pub(crate) struct ShadowView {
     pub others: Vec<(u32, Aabb)>,
     /// Whether rays have to be traced through all trees.
     pub trees: bool,
+    /// Whether anything that is not opaque may dim some of the light.
+    pub layers: bool,
     /// For each block of sixteen samples, a mask of the hidden ones, in the light's order.
     pub hidden: Vec<u16>,
+    /// For each block of sixteen samples, the part of each that layers let through; empty without layers.
+    pub left: Vec<[f32; LANES]>,
     leaves: Vec<u32>,
     /// The same in the order of the blocks of the target, while it is computed.
     pub(super) in_space: Vec<u16>,
@@ -58,7 +62,9 @@ impl ShadowView {
         self.triangles.clear();
         self.others.clear();
         self.hidden.clear();
+        self.left.clear();
         self.trees = false;
+        self.layers = false;
     }
 
     /// Whether any occluder is tested sample by sample: triangles, and what is in trees.
@@ -112,6 +118,7 @@ impl ShadowView {
             }
         }
         self.trees = occluders.too_many;
+        self.layers = occluders.layers;
         if !occluders.leaves.is_empty() {
             let hidden = dispatch_all!(
                 level,
@@ -126,6 +133,7 @@ impl ShadowView {
         }
         self.gather_others(scene, target, &light, occluders, point);
         let is_clear = self.spheres.is_empty() && self.flats.is_empty() && self.disks.is_empty() && !self.needs_mask();
+        let is_clear = is_clear && !self.layers;
         if is_clear { Visibility::Full } else { Visibility::Partial }
     }
 

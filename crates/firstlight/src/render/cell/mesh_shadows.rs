@@ -54,7 +54,7 @@ impl MeshShadows {
             known: Vec::new(),
             only: vec![NONE; PIXELS],
             unoccluded: vec![Vec::new(); lights],
-            pilot: vec![None; if scene.geometry.has_boxes() { PIXELS * lights } else { 0 }],
+            pilot: vec![None; if scene.geometry.is_sampled_past() { PIXELS * lights } else { 0 }],
             nodes: Vec::new(),
         }
     }
@@ -79,7 +79,7 @@ impl CellRenderer<'_> {
         counts: &mut Counts,
         go_on: &impl Fn() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        if !self.scene.geometry.has_boxes() {
+        if !self.scene.geometry.is_sampled_past() {
             return ControlFlow::Continue(());
         }
         self.begin_shadows(counts);
@@ -135,8 +135,8 @@ impl CellRenderer<'_> {
             if self.is_open(number) {
                 self.trace_rays(number, counts);
             }
-            let Fragment { count, mean, rays, .. } = &self.fragments.all[number];
-            if *count == self.rays_per_pixel() && !mean.lobes_differ && !rays.is_empty() {
+            let Fragment { count, mean, rays, through_layers, .. } = &self.fragments.all[number];
+            if !through_layers && *count == self.rays_per_pixel() && !mean.lobes_differ && !rays.is_empty() {
                 let pixel = self.pixel_of(number);
                 self.shadows.only[pixel] = number as u32;
             }

@@ -226,7 +226,9 @@ impl CellRenderer<'_> {
         let sampler = self.lights.sampler(light);
         let at = |inner: usize| [x + inner as u32 % BLOCK, y + inner as u32 / BLOCK];
         let mut packet: Option<Packet> = None;
-        let (mut all, mut hidden) = ([0u32; LANES], [0u32; LANES]);
+        let (mut all, mut hidden) = ([0u32; LANES], [0.0f32; LANES]);
+        // Of the rays of a packet, by pixel: what layers stop of the light
+        let mut dimmed = [0.0f32; LANES];
         for cell in 0..PILOT_RAYS {
             for inner in 0..LANES {
                 let rays = self.rays_of(at(inner));
@@ -240,7 +242,7 @@ impl CellRenderer<'_> {
                 if point.horizon.dot(l) > 0.0 && point.ns.dot(l) > 0.0 {
                     all[inner] += 1;
                     if scene.occluded_by_lists(&point.ray(sampler.end(), l, true)) {
-                        hidden[inner] += 1;
+                        hidden[inner] += 1.0;
                     } else {
                         let packet = packet.get_or_insert_with(|| Packet::new(sampler.end(), &point));
                         packet.add((inner * PILOT_RAYS + cell) as u32, &point, l, inner as u32);
@@ -248,14 +250,20 @@ impl CellRenderer<'_> {
                 }
             }
             if let Some(packet) = &mut packet {
-                let traced = packet.trace(scene, |_, inner| hidden[inner as usize] += 1);
+                if scene.has_layers() {
+                    dimmed.fill(0.0);
+                    packet.dim(scene, |_, inner, left| dimmed[inner as usize] = 1.0 - left);
+                }
+                // One of each pixel
+                let traced = packet.trace(scene, |_, inner| dimmed[inner as usize] = 1.0);
+                hidden.iter_mut().zip(&mut dimmed).for_each(|(sum, dimmed)| *sum += std::mem::take(dimmed));
                 counts.visibility.traced += traced;
                 counts.shadow_rays += traced;
             }
         }
         for inner in 0..LANES {
             let pixel = self.index(at(inner)) * scene.lights.len() + light;
-            self.shadows.pilot[pixel] = Some((all[inner] - hidden[inner]) as f32 / all[inner] as f32);
+            self.shadows.pilot[pixel] = Some((all[inner] as f32 - hidden[inner]) / all[inner] as f32);
         }
     }
 

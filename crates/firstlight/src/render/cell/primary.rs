@@ -15,7 +15,7 @@ use crate::render::square::Square;
 use crate::render::tile_frustum::TileFrustum;
 use crate::render::visible_shape::{MeanBsdf, VisibleShape};
 use crate::render::{AaMode, Counts};
-use crate::scene::{Hit, Scene};
+use crate::scene::{Hit, Layer, Scene};
 use crate::shape::RayDifferential;
 
 /// Pixels across the smallest squares that may provably see one surface.
@@ -35,7 +35,7 @@ impl CellRenderer<'_> {
         let frustum = TileFrustum::new(scene, square);
         let near = frustum.candidates(scene, candidates);
         if near.is_empty() {
-            let terms = PixelTerms { background: self.rays_per_pixel(), ..PixelTerms::default() };
+            let terms = PixelTerms { background: self.rays_per_pixel().into(), ..PixelTerms::default() };
             for at in self.on_film(square) {
                 let index = self.index(at);
                 terms.resolve(scene, iter::empty(), index, &mut self.sums);
@@ -51,13 +51,14 @@ impl CellRenderer<'_> {
                 self.add_blocks(square, only)
             };
         }
-        let in_packets = near.contains(&VisibleShape::Trees);
+        let with_layers = near.contains(&VisibleShape::Layers);
+        let in_packets = with_layers || near.contains(&VisibleShape::Trees);
         if square.side > if in_packets { SMALLEST.max(self.hits.side()) } else { SMALLEST } {
             for quarter in square.quarters_on([scene.width, scene.height]) {
                 self.primary(quarter, &near, counts);
             }
         } else if in_packets {
-            self.trace_packets(square, counts);
+            self.trace_packets(square, with_layers, counts);
         } else {
             for at in self.on_film(square) {
                 self.trace(at, &near, counts);
@@ -65,8 +66,8 @@ impl CellRenderer<'_> {
         }
     }
 
-    /// Traces the rays of a square that may hit anything.
-    fn trace_packets(&mut self, Square { x, y, side }: Square, counts: &mut Counts) {
+    /// Traces the rays of a square that may hit anything, or anything but layers.
+    fn trace_packets(&mut self, Square { x, y, side }: Square, with_layers: bool, counts: &mut Counts) {
         let scene = self.scene;
         let step = self.hits.side().min(side);
         let (width, height) = (side.min(scene.width - x), side.min(scene.height - y));
@@ -77,7 +78,7 @@ impl CellRenderer<'_> {
                     let hit = cells.hits.get(at, x.into(), y.into())?;
                     Some((VisibleShape::of(scene, &hit), hit))
                 };
-                self.add_pixel(at, seen, counts);
+                self.add_pixel(at, seen, with_layers, counts);
             }
         }
     }
@@ -94,7 +95,7 @@ impl CellRenderer<'_> {
             };
             hits.reduce(nearer).map(|(shape, t)| (Some(shape), shape.hit_at(scene, ray, t)))
         };
-        self.add_pixel(at, seen, counts);
+        self.add_pixel(at, seen, false, counts);
     }
 
     /// A pixel whose terms are to be summed, from so many rays.
@@ -108,8 +109,14 @@ impl CellRenderer<'_> {
     }
 
     /// Adds a pixel whose rays hit what `seen` returns, with its fragments: one of each surface, in the order in which
-    /// the rays hit them; without adaptive antialiasing one of each ray.
-    fn add_pixel(&mut self, [i, j]: [u32; 2], seen: impl Fn(&Self, [u16; 2], &Ray) -> Seen, counts: &mut Counts) {
+    /// the rays hit them; without adaptive antialiasing one of each ray. Layers come before what is seen past them.
+    fn add_pixel(
+        &mut self,
+        [i, j]: [u32; 2],
+        seen: impl Fn(&Self, [u16; 2], &Ray) -> Seen,
+        with_layers: bool,
+        counts: &mut Counts,
+    ) {
         let (scene, n) = (self.scene, self.scene.antialiasing);
         let mut pixel = self.pixel([i, j], n * n, counts);
         let (mut rays, mut points) = (std::mem::take(&mut self.rays), std::mem::take(&mut self.ray_points));
@@ -122,30 +129,46 @@ impl CellRenderer<'_> {
                 true => RayDifferential::default(),
                 false => camera_ray(scene, i * n + k % n, j * n + k / n).1,
             };
-            let Some((shape, hit)) = seen(self, at, ray) else {
-                pixel.terms.background += 1;
+            let end = seen(self, at, ray);
+            let mut left = 1.0;
+            if with_layers {
+                let stack = &mut self.stack;
+                scene.find_layers(ray, &differential(), end.as_ref().map(|(_, hit)| hit), stack);
+                left = stack.left;
+                for Layer { surface, weight, .. } in &stack.layers {
+                    pixel.terms.emission.add(scene.emission(surface), f64::from(*weight));
+                    let point = ShadingPoint::of(surface, &scene.bsdf(surface).weighted(*weight), &scene.ambient);
+                    points.push(RayPoint { shape: None, point, at, through_layers: true });
+                }
+                if left == 0.0 {
+                    continue;
+                }
+            }
+            let Some((shape, hit)) = end else {
+                pixel.terms.background += f64::from(left);
                 continue;
             };
             if let Some(light) = hit.surface.index().checked_sub(scene.geometry.surfaces.len()) {
-                pixel.terms.emission.add(scene.lights[light].radiance, 1);
+                pixel.terms.emission.add(scene.lights[light].radiance, left.into());
                 continue;
             }
             let point = match shape {
                 Some(shape) => {
                     let bsdf = self.fragments.plain_bsdf(scene, shape).unwrap_or_else(|| {
                         let si = shape.interaction(scene, ray, hit.t, &differential());
-                        pixel.terms.emission.add(scene.emission(&si), 1);
+                        pixel.terms.emission.add(scene.emission(&si), left.into());
                         scene.bsdf(&si)
                     });
+                    let bsdf = bsdf.weighted(left);
                     shape.point(scene, ray, hit.t, &bsdf)
                 }
                 None => {
                     let si = scene.local_surface(ray, &hit, &differential());
-                    pixel.terms.emission.add(scene.emission(&si), 1);
-                    ShadingPoint::of(&si, &scene.bsdf(&si), &scene.ambient)
+                    pixel.terms.emission.add(scene.emission(&si), left.into());
+                    ShadingPoint::of(&si, &scene.bsdf(&si).weighted(left), &scene.ambient)
                 }
             };
-            points.push(RayPoint { shape, point, at });
+            points.push(RayPoint { shape, point, at, through_layers: left != 1.0 });
         }
         let number = self.pixels.len() as u32;
         self.pixels.push(pixel);

@@ -28,7 +28,7 @@ impl DirectLighting<'_> {
         if reach > 0.0 && turn == 0.0 && place.but != Facet::NONE {
             trees.leaves.retain(|(source, leaf)| rises(scene, &place, *source, *leaf));
         }
-        !trees.has_meshes() && lights.know(index, trees.others.iter().copied())
+        !trees.layers && !trees.has_meshes() && lights.know(index, trees.others.iter().copied())
     }
 
     /// The visibility of light `index` from all of some points together, by one shaft.
@@ -39,7 +39,7 @@ impl DirectLighting<'_> {
         occluders.gather(self.level, self.scene, &self.lights.targets[index], points, &self.indices, 0);
         counts.visibility.shafts += 1;
         let is_known = || self.lights.know(index, occluders.others.iter().copied()) && !occluders.has_meshes();
-        if occluders.has_trees() && !is_known() {
+        if occluders.layers || occluders.has_trees() && !is_known() {
             Visibility::Partial
         } else if occluders.count() > 0 {
             Visibility::Listed
@@ -67,7 +67,7 @@ impl DirectLighting<'_> {
             }
             let is_listed = listed || view.spheres.is_empty() && view.flats.is_empty();
             let is_known = || lights.know(index, view.others.iter().map(|(thing, _)| *thing));
-            if !view.trees && is_listed && view.triangles.is_empty() && is_known() {
+            if !view.trees && !view.layers && is_listed && view.triangles.is_empty() && is_known() {
                 each(k, Visibility::Listed, None);
             } else {
                 each(k, visibility, Some(std::mem::replace(view, views.pop().unwrap_or_default())));

@@ -79,7 +79,10 @@ impl<'a> Sampled<'a> {
         match visibility {
             Visibility::None | Visibility::BelowHorizon => Moments::ZERO,
             Visibility::Full => self.lit(point),
-            Visibility::Partial | Visibility::Listed => self.sum(point, &PointObstacles::of(view)),
+            Visibility::Partial | Visibility::Listed => {
+                let layers = view.layers.then(|| (self.scene, self.target.end()));
+                self.sum(point, &PointObstacles { layers, ..PointObstacles::of(view) })
+            }
         }
     }
 

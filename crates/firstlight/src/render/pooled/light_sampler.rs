@@ -17,7 +17,7 @@ use fearless_simd::{Level, f32x16, mask32x16, prelude::*};
 use super::strata::{BlockSamples, StratumSums};
 use crate::accel::{RayPacket16, dispatch_all};
 use crate::color::Rgb;
-use crate::integrate::Emitter;
+use crate::integrate::{Emitter, TOLERANCE};
 use crate::light::{Area, FineCell, MIN_DISTANCE2, Points, SERIES, SeriesPart};
 use crate::material::{Colors, LobeLanes, Moments, PerMoment, ShadingPoint};
 use crate::math::{DVec3, LANES, LightEnd, ShadowRay, Vec3, Vec3x16};
@@ -210,8 +210,38 @@ impl<'a> LightSampler<'a> {
             }
             counts.visibility.traced += packet.trace(self.scene, hide);
         }
+        self.dim(sets, wanted, receivers, counts);
         counts.shadow_rays += points;
         counts.shadow_rays_skipped += points - (counts.visibility.traced - traced_before);
+    }
+
+    /// Finds what layers let through to each receiver of the wanted points of its set.
+    fn dim(&self, sets: &[Cow<LightPoints>], wanted: &[u16], receivers: &mut [SampledReceiver], counts: &mut Counts) {
+        let mut dimmed = Vec::new();
+        for (number, receiver) in receivers.iter_mut().enumerate() {
+            receiver.view.left.clear();
+            if receiver.view.layers {
+                receiver.view.left.resize(wanted.len(), [1.0; LANES]);
+                dimmed.push((number as u32, Viewpoint::of(&receiver.point)));
+            }
+        }
+        let Some((_, any)) = dimmed.first() else { return };
+        let mut packet = Packet::new(self.end(), any);
+        // The rays to one stratum are nearly parallel
+        let is_wanted = |k: &usize| wanted[k / LANES] >> (k % LANES) & 1 == 1;
+        for k in (0..wanted.len() * LANES).filter(is_wanted) {
+            for (number, point) in &dimmed {
+                let hidden = receivers[*number as usize].view.hidden.get(k / LANES).copied().unwrap_or(0);
+                let l = sets[*number as usize].points.get(k) - point.p;
+                if hidden >> (k % LANES) & 1 == 0
+                    && point.horizon.dot(l) > 0.0
+                    && packet.add(*number, point, l, k as u32)
+                {
+                    counts.shadow_rays += packet.dim_all(self.scene, receivers);
+                }
+            }
+        }
+        counts.shadow_rays += packet.dim_all(self.scene, receivers);
     }
 
     /// What points at some places of the parameter square would send to a receiver, each for all of the light.
@@ -298,6 +328,22 @@ impl<'a, S: Simd> ReceiverLanes<'a, S> {
         samples
     }
 
+    /// The part of each sample of a block that arrives, where layers dim any: 0 of those that are hidden. Samples that
+    /// are dimmed count as hidden thereby where silhouettes are looked for; where layers dim neighbours differently,
+    /// those that are dimmed more.
+    pub fn dim(&self, samples: &mut BlockSamples, block: usize, left: &[[f32; LANES]]) -> [f32; LANES] {
+        let is_lit = |lane: usize| samples.lit() >> lane & 1 == 1;
+        let of_layers = left.get(block);
+        let left: [f32; LANES] =
+            std::array::from_fn(|lane| if is_lit(lane) { of_layers.map_or(1.0, |left| left[lane]) } else { 0.0 });
+        let sending = (0..LANES).filter(|lane| samples.sends >> lane & 1 == 1);
+        let (least, most) = sending.fold((1.0f32, 0.0f32), |(a, b), lane| (a.min(left[lane]), b.max(left[lane])));
+        let border = if most - least > TOLERANCE.same_left { 0.5 * (least + most) } else { 1.0 };
+        let dimmed = (0..LANES).filter(|lane| left[*lane] < border).fold(0, |bits, lane| bits | 1 << lane);
+        samples.hidden = samples.sends & dimmed;
+        left
+    }
+
     /// The ways to the points of a block.
     #[inline(always)]
     fn ways(&self, simd: S, points: &Points, block: usize) -> Vec3x16<S> {
@@ -371,25 +417,54 @@ impl Packet {
         self.count == LANES
     }
 
+    /// Calls `dim` with receiver and point of each ray, and what layers let through, where that is not all: those that
+    /// [`trace`](Self::trace) finds blocked included.
+    pub fn dim(&self, scene: &Scene, mut dim: impl FnMut(u32, u32, f32)) {
+        if self.count == 0 {
+            return;
+        }
+        let (shadows, all) = self.shadows();
+        let left = scene.left_by_layers16(&shadows, all);
+        for lane in (0..self.count).filter(|lane| left[*lane] < 1.0) {
+            dim(self.receivers[lane], self.points[lane], left[lane]);
+        }
+    }
+
+    /// Stores what layers leave of each ray in the views of its receiver, and empties the packet. Returns the number of
+    /// rays.
+    fn dim_all(&mut self, scene: &Scene, receivers: &mut [SampledReceiver]) -> u64 {
+        self.dim(scene, |receiver, point, left| {
+            let lanes = &mut receivers[receiver as usize].view.left[point as usize / LANES];
+            lanes[point as usize % LANES] = left;
+        });
+        std::mem::take(&mut self.count) as u64
+    }
+
+    /// Its rays, and which lanes have one.
+    fn shadows(&self) -> (ShadowRays<'_>, u16) {
+        let mut t_end = [0.0; LANES];
+        for (lane, t_end) in t_end.iter_mut().enumerate().take(self.count) {
+            *t_end = ShadowRay { l: self.rays.d(lane), ..self.from[lane] }.end();
+        }
+        let all = ((1u32 << self.count) - 1) as u16;
+        (ShadowRays { from: &self.from, rays: self.rays.clone(), t_end }, all)
+    }
+
     /// Traces the rays through the trees and empties the packet. `hide` takes receiver and point of each ray that is
     /// blocked. Returns the number of rays.
     pub fn trace(&mut self, scene: &Scene, mut hide: impl FnMut(u32, u32)) -> u64 {
-        let count = std::mem::take(&mut self.count);
+        let count = self.count;
         if count == 0 {
             return 0;
         }
-        let mut t_end = [0.0; LANES];
-        for (lane, t_end) in t_end.iter_mut().enumerate().take(count) {
-            *t_end = ShadowRay { l: self.rays.d(lane), ..self.from[lane] }.end();
-        }
-        let shadows = ShadowRays { from: &self.from, rays: self.rays.clone(), t_end };
-        let all = ((1u32 << count) - 1) as u16;
+        let (shadows, all) = self.shadows();
         let mut hidden = scene.geometry.are_blocked(scene.level, &shadows, all);
         while hidden != 0 {
             let lane = hidden.trailing_zeros() as usize % LANES;
             hidden &= hidden - 1;
             hide(self.receivers[lane], self.points[lane]);
         }
+        self.count = 0;
         count as u64
     }
 }

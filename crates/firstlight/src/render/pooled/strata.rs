@@ -120,6 +120,8 @@ pub(super) struct Strata<'a> {
     pub order: Vec<u32>,
     /// Block by block, receiver by receiver.
     samples: Vec<BlockSamples>,
+    /// In the same order, the part of each sample that arrives; empty where no layer dims any.
+    left: Vec<[f32; LANES]>,
     /// How often the light was halved to make each stratum, at least.
     level: u32,
     /// Whether all strata were halved once, so that it is known what the first samples overlooked.
@@ -142,16 +144,22 @@ impl<'a> Strata<'a> {
         let sets: Vec<_> = receivers.iter().map(|receiver| sampler.first(receiver.series, count)).collect();
         sampler.occlude(&sets, &vec![u16::MAX; blocks.len()], receivers, counts);
         let mut samples = vec![BlockSamples::NONE; blocks.len() * receivers.len()];
+        let is_dimmed = receivers.iter().any(|receiver| receiver.view.layers);
+        let mut left = vec![[0.0; LANES]; if is_dimmed { samples.len() } else { 0 }];
         dispatch_all!(sampler.level, simd => {
             for (k, (receiver, set)) in receivers.iter().zip(&sets).enumerate() {
                 let lanes = ReceiverLanes::new(simd, &sampler, receiver);
                 for block in 0..blocks.len() {
-                    samples[block * receivers.len() + k] = lanes.sample(simd, set, block);
+                    let number = block * receivers.len() + k;
+                    samples[number] = lanes.sample(simd, set, block);
+                    if is_dimmed {
+                        left[number] = lanes.dim(&mut samples[number], block, &receiver.view.left);
+                    }
                 }
             }
         });
         let (receivers, surprises) = (receivers.len(), [0.0; MOMENTS]);
-        Strata { sampler, receivers, blocks, order, samples, level, is_halved: false, surprises }
+        Strata { sampler, receivers, blocks, order, samples, left, level, is_halved: false, surprises }
     }
 
     /// The samples of all receivers together.
@@ -179,16 +187,25 @@ impl<'a> Strata<'a> {
         let mut sums = StratumSums::default();
         dispatch_all!(self.sampler.level, simd => {
             let mut samples = self.of_receiver(receiver);
+            let mut left = self.left.get(receiver..).unwrap_or_default().iter().step_by(self.receivers);
             for blocks in self.blocks.chunks(RUN) {
                 let mut lanes = [[simd.splat_f32x16(0.0); 3]; MOMENTS];
                 for (block, samples) in blocks.iter().zip(&mut samples) {
                     let part = block.part();
                     sums.sending += f64::from(samples.sends.count_ones()) * f64::from(part);
-                    sums.hidden += f64::from(samples.hidden.count_ones()) * f64::from(part);
+                    let left = left.next();
+                    let hidden = match left {
+                        None => f64::from(samples.hidden.count_ones()),
+                        Some(left) => samples.dimmed(left),
+                    };
+                    sums.hidden += hidden * f64::from(part);
                     for (lanes, sent) in lanes.iter_mut().zip(samples.lanes(simd)) {
                         let sent = sent * part;
                         lanes[0] += sent;
-                        lanes[1] += only(simd, samples.lit(), sent);
+                        lanes[1] += match left {
+                            None => only(simd, samples.lit(), sent),
+                            Some(left) => sent * f32x16::load_array_ref(simd, left),
+                        };
                         lanes[2] += sent * sent;
                     }
                 }
@@ -328,6 +345,10 @@ impl<'a> Strata<'a> {
         let mut splits = split_blocks(&mut self.blocks, &mut self.order, choose);
         let halves = splits.iter().flat_map(|split| split.halves).collect();
         self.samples.resize(self.blocks.len() * self.receivers, BlockSamples::NONE);
+        let is_dimmed = !self.left.is_empty();
+        if is_dimmed {
+            self.left.resize(self.samples.len(), [0.0; LANES]);
+        }
         splits.sort_by_key(|split| split.before.level);
         for splits in splits.chunk_by(|one, other| one.before.level == other.before.level) {
             let level = splits[0].before.level;
@@ -347,8 +368,13 @@ impl<'a> Strata<'a> {
                     let lanes = ReceiverLanes::new(simd, &self.sampler, &receivers[receiver]);
                     let mut surprises = [simd.splat_f32x16(0.0); MOMENTS];
                     for (k, split) in splits.iter().enumerate() {
-                        let new = lanes.sample(simd, set, in_set(k));
+                        let mut new = lanes.sample(simd, set, in_set(k));
                         let numbers = split.halves.map(|half| half as usize * self.receivers + receiver);
+                        if is_dimmed {
+                            let left = lanes.dim(&mut new, in_set(k), &receivers[receiver].view.left);
+                            let halves = BlockSamples::halves_of_left(&new, &self.left[numbers[0]], &left, level);
+                            [self.left[numbers[0]], self.left[numbers[1]]] = halves;
+                        }
                         let old = self.samples[numbers[0]];
                         if split.is_away {
                             let is_surprise = !(new.sends ^ old.sends) & (new.hidden ^ old.hidden);
@@ -413,6 +439,22 @@ impl BlockSamples {
     /// Those that send, and are not hidden.
     pub fn lit(&self) -> u16 {
         self.sends & !self.hidden
+    }
+
+    /// How many that send are hidden, those that layers dim in part.
+    fn dimmed(&self, left: &[f32; LANES]) -> f64 {
+        let sending = (0..LANES).filter(|lane| self.sends >> lane & 1 == 1);
+        sending.map(|lane| 1.0 - f64::from(left[lane])).sum()
+    }
+
+    /// The parts that arrive of the samples in both halves of each stratum; see [`halves`](Self::halves).
+    fn halves_of_left(new: &BlockSamples, old: &[f32; LANES], left: &[f32; LANES], level: u32) -> [[f32; LANES]; 2] {
+        let mut halves = [[0.0; LANES]; 2];
+        for (stratum, (old, left)) in old.iter().zip(left).enumerate() {
+            let pair = if new.at[stratum].half(level) == 1 { [*old, *left] } else { [*left, *old] };
+            halves[2 * stratum / LANES][2 * stratum % LANES..][..2].copy_from_slice(&pair);
+        }
+        halves
     }
 
     /// What each would send for all of the light.

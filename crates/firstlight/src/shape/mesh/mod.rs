@@ -50,6 +50,8 @@ shape_table! {
         pub uv_set: u32 = 0,
         /// A colour for each vertex, linear Rec. 709.
         pub colors: Vec<[f64; 3]> = Vec::new(),
+        /// An alpha for each vertex, 0 to 1; without, 1.
+        pub alphas: Vec<f64> = Vec::new(),
         /// The names of materials that `face_materials` chooses from.
         pub materials: Vec<String> = Vec::new(),
         /// The material of each triangle, as a position in `materials`, counted from 0.
@@ -113,6 +115,20 @@ pub(crate) struct MeshSource {
     pub uv_set: usize,
     /// The key of `data`, where it may be of use.
     content: Option<ContentKey>,
+    /// The numbers of its triangles in the mesh that it is a part of; empty if it is all of it.
+    numbers: Vec<u32>,
+}
+
+impl MeshSource {
+    /// The triangles whose materials are `wanted`, as a source of their own; each keeps its number.
+    pub fn part(&self, wanted: impl Fn(u32) -> bool) -> MeshSource {
+        let mut data = (*self.data).clone();
+        let faces = &self.data.face_materials;
+        let numbers: Vec<u32> = (0..data.triangles.len() as u32).filter(|i| wanted(faces[*i as usize])).collect();
+        data.triangles = numbers.iter().map(|i| self.data.triangles[*i as usize]).collect();
+        data.face_materials = numbers.iter().map(|i| faces[*i as usize]).collect();
+        MeshSource { data: Arc::new(data), uv_set: self.uv_set, content: None, numbers }
+    }
 }
 
 impl MeshDesc {
@@ -153,7 +169,7 @@ impl MeshDesc {
             return None;
         }
         let (data, content) = self.smoothed(data, content, files.cache);
-        Some(MeshSource { data, uv_set, content })
+        Some(MeshSource { data, uv_set, content, numbers: Vec::new() })
     }
 
     /// The mesh as it is said, and its key where something is kept. `None` after an error.
@@ -217,13 +233,24 @@ impl MeshDesc {
         (smooth, key)
     }
 
-    fn lists(&self) -> [(&'static str, bool); 7] {
+    /// The colour and the alpha of each vertex; none if neither is said.
+    fn vertex_colors(&self) -> Vec<[f32; 4]> {
+        let said = if self.alphas.is_empty() { self.colors.len() } else { self.positions.len() };
+        let of_vertex = |i: usize| {
+            let [r, g, b] = self.colors.get(i).copied().unwrap_or([1.0; 3]);
+            [r, g, b, self.alphas.get(i).copied().unwrap_or(1.0)].map(|c| c as f32)
+        };
+        (0..said).map(of_vertex).collect()
+    }
+
+    fn lists(&self) -> [(&'static str, bool); 8] {
         [
             ("positions", !self.positions.is_empty()),
             ("triangles", !self.triangles.is_empty()),
             ("normals", !self.normals.is_empty()),
             ("uvs", !self.uvs.is_empty()),
             ("colors", !self.colors.is_empty()),
+            ("alphas", !self.alphas.is_empty()),
             ("materials", !self.materials.is_empty()),
             ("face_materials", !self.face_materials.is_empty()),
         ]
@@ -238,8 +265,13 @@ impl MeshDesc {
             cx.error(field, "there is neither a file nor both positions and triangles", Some(hint));
         }
         let vertices = self.positions.len();
-        for (field, length) in [("normals", self.normals.len()), ("uvs", self.uvs.len()), ("colors", self.colors.len())]
-        {
+        let of_vertices = [
+            ("normals", self.normals.len()),
+            ("uvs", self.uvs.len()),
+            ("colors", self.colors.len()),
+            ("alphas", self.alphas.len()),
+        ];
+        for (field, length) in of_vertices {
             if length != 0 && length != vertices {
                 let message = format!("{length} of them for {vertices} positions");
                 cx.error(field, message, Some("give one for each vertex, or none"));
@@ -265,6 +297,9 @@ impl MeshDesc {
                 let message = format!("{} is outside [0, 1e6]", show(color));
                 cx.error(&format!("colors[{i}]"), message, Some("a colour is linear red, green, blue"));
             }
+        }
+        for (i, alpha) in self.alphas.iter().enumerate().filter(|(i, _)| is_used(*i)) {
+            cx.between(&format!("alphas[{i}]"), *alpha, 0.0, 1.0, Some("0 lets all light through, 1 none"));
         }
         let normals = self.normals.iter().enumerate().map(|(i, normal)| ("normals", i, &normal[..]));
         let uvs = self.uvs.iter().enumerate().map(|(i, uv)| ("uvs", i, &uv[..]));
@@ -298,7 +333,7 @@ impl MeshDesc {
             } else {
                 vec![self.uvs.iter().map(|uv| uv.map(|c| c as f32)).collect()]
             },
-            colors: self.colors.iter().map(|c| [c[0] as f32, c[1] as f32, c[2] as f32, 1.0]).collect(),
+            colors: self.vertex_colors(),
             triangles: self.triangles.clone(),
             face_materials: self.face_materials.clone(),
             materials: self.materials.clone(),
@@ -316,6 +351,8 @@ pub(crate) struct MeshBuilder {
     counts: [usize; 2],
     bounds: Option<[DVec3; 2]>,
     joined: Lists,
+    /// Whether a triangle that is there twice is met twice.
+    pub keeps_copies: bool,
 }
 
 /// A mesh that is to be joined with others, and its part of them.
@@ -327,6 +364,7 @@ struct JoinedSource {
     surface: u32,
     class: u32,
     materials: Vec<MaterialId>,
+    numbers: Vec<u32>,
 }
 
 /// What is joined of all meshes.
@@ -336,7 +374,7 @@ struct Lists {
     triangles: Vec<[u32; 3]>,
     normals: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
-    colors: Vec<[f32; 3]>,
+    colors: Vec<[f32; 4]>,
     parts: Vec<JoinedPart>,
     /// Of each part: rays treat parts of one class alike.
     classes: Vec<u32>,
@@ -357,6 +395,11 @@ fn join<T: Clone>(list: &mut Vec<T>, length: usize, more: Vec<T>, added: usize, 
 }
 
 impl MeshBuilder {
+    /// Of a mesh in which a triangle that is there twice is met twice.
+    pub fn with_copies() -> MeshBuilder {
+        MeshBuilder { keeps_copies: true, ..MeshBuilder::default() }
+    }
+
     /// Adds a mesh, moved by `transform`; `surface` is its number in the group, `materials` what its faces choose from.
     /// Rays are let through, and light is stopped, by all meshes of a `class` alike.
     pub fn add(
@@ -368,7 +411,7 @@ impl MeshBuilder {
         class: u32,
         materials: Vec<MaterialId>,
     ) {
-        let MeshSource { data, uv_set, content } = source;
+        let MeshSource { data, uv_set, content, numbers } = source;
         let counts = [self.counts[0] + data.positions.len(), self.counts[1] + data.triangles.len()];
         if counts.iter().any(|count| *count > u32::MAX as usize) {
             let message = "the meshes of one group have more than 4294967295 vertices or triangles together";
@@ -391,7 +434,7 @@ impl MeshBuilder {
             (Some([low, high]), Some([a, b])) => Some([low.min(a), high.max(b)]),
             (all, own) => all.or(own),
         };
-        self.sources.push(JoinedSource { data, uv_set, content, transform, surface, class, materials });
+        self.sources.push(JoinedSource { data, uv_set, content, transform, surface, class, materials, numbers });
     }
 
     /// The box around all meshes so far, in the space that they are joined in.
@@ -401,7 +444,7 @@ impl MeshBuilder {
 
     /// What the joined mesh follows from; `None` where that is not known.
     fn key(&self, origin: DVec3) -> Option<ContentKey> {
-        let mut parts = vec![numbers(&origin.to_array())];
+        let mut parts = vec![numbers(&origin.to_array()), vec![u8::from(self.keeps_copies)]];
         for source in &self.sources {
             parts.push(source.content?.to_vec());
             parts.push(source.transform.map_or(Vec::new(), |transform| numbers(&transform.to_cols_array())));
@@ -438,7 +481,8 @@ impl MeshBuilder {
         let mut mesh = Mesh { positions, triangles, normals, uvs, colors, parts, tree };
         // Copies of a triangle are one, but where rays may treat them differently: by their surface, or by the side
         // that their normals say is the front
-        let class = |triangle| (classes[mesh.part_index(triangle)], mesh.is_turned(triangle));
+        let own = |triangle| if self.keeps_copies { triangle } else { 0 };
+        let class = |triangle| (classes[mesh.part_index(triangle)], mesh.is_turned(triangle), own(triangle));
         mesh.tree = TriangleTree::build_distinct(&mesh.positions, &mesh.triangles, class);
         Some(mesh)
     }
@@ -446,7 +490,7 @@ impl MeshBuilder {
 
 impl Lists {
     fn add(&mut self, source: JoinedSource, origin: DVec3) {
-        let JoinedSource { data, uv_set, transform, surface, class, materials, .. } = source;
+        let JoinedSource { data, uv_set, transform, surface, class, materials, numbers, .. } = source;
         let mut data = Arc::unwrap_or_clone(data);
         move_mesh(&mut data, transform, origin);
         let (vertices, first) = (self.positions.len(), self.triangles.len());
@@ -459,12 +503,16 @@ impl Lists {
             surface,
             face_materials,
             materials,
+            numbers,
             has_uvs: !own_uvs.is_empty(),
         });
-        let colors = colors.into_iter().map(|[r, g, b, _]| [r, g, b].map(|c| if c >= 0.0 { c.min(1e6) } else { 0.0 }));
+        let colors = colors.into_iter().map(|[r, g, b, a]| {
+            let [r, g, b] = [r, g, b].map(|c| if c >= 0.0 { c.min(1e6) } else { 0.0 });
+            [r, g, b, if a >= 0.0 { a.min(1.0) } else { 0.0 }]
+        });
         join(&mut self.normals, vertices, normals, added, [0.0; 3]);
         join(&mut self.uvs, vertices, own_uvs, added, [0.0; 2]);
-        join(&mut self.colors, vertices, colors.collect(), added, [1.0; 3]);
+        join(&mut self.colors, vertices, colors.collect(), added, [1.0; 4]);
         if vertices > 0 {
             triangles.iter_mut().flatten().for_each(|v| *v += vertices as u32);
             self.triangles.extend(triangles);

@@ -18,8 +18,9 @@ pub(crate) struct Mesh {
     pub normals: Vec<[f32; 3]>,
     /// One for each position; empty if no part has any.
     pub uvs: Vec<[f32; 2]>,
-    /// Linear Rec. 709, one for each position; empty if no part has any. The colours of parts without are white.
-    pub colors: Vec<[f32; 3]>,
+    /// Linear Rec. 709 and alpha, one for each position; empty if no part has any. Those of parts without are white and
+    /// opaque.
+    pub colors: Vec<[f32; 4]>,
     /// The meshes it was joined from, in scene order, by their first triangle.
     pub parts: Vec<JoinedPart>,
     pub tree: TriangleTree,
@@ -36,11 +37,19 @@ pub(crate) struct JoinedPart {
     pub face_materials: Vec<u32>,
     /// What `face_materials` chooses from; the first is that of all where it is empty.
     pub materials: Vec<MaterialId>,
+    /// The number of each triangle in its mesh, where that has others too; empty where it has them all.
+    pub numbers: Vec<u32>,
     /// Whether it has texture coordinates of its own.
     pub has_uvs: bool,
 }
 
 impl JoinedPart {
+    /// The number of a triangle of the joined mesh in its own.
+    pub fn number(&self, triangle: u32) -> u32 {
+        let own = triangle - self.first_triangle;
+        self.numbers.get(own as usize).copied().unwrap_or(own)
+    }
+
     /// The material of a triangle of the joined mesh.
     pub fn material(&self, triangle: u32) -> MaterialId {
         let index = self.face_materials.get((triangle - self.first_triangle) as usize).copied().unwrap_or(0);
@@ -70,7 +79,29 @@ fn blended(corners: [DVec3; 3], at: TrianglePoint) -> DVec3 {
     corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]
 }
 
+/// Whether a list, if there is one, has the same for all corners of a triangle.
+fn is_one<const N: usize>(list: &[[f32; N]], [a, b, c]: [usize; 3]) -> bool {
+    list.is_empty() || list[a] == list[b] && list[b] == list[c]
+}
+
 impl Mesh {
+    /// The alpha of the vertices at a point, 0 to 1; 1 where they have none.
+    pub fn alpha(&self, at: TrianglePoint) -> f32 {
+        if self.colors.is_empty() {
+            return 1.0;
+        }
+        let [a, b, c] = self.triangles[at.triangle as usize].map(|i| f64::from(self.colors[i as usize][3]));
+        let weights = weights(at);
+        ((a * weights[0] + b * weights[1] + c * weights[2]) as f32).clamp(0.0, 1.0)
+    }
+
+    /// The texture coordinate at a point.
+    pub fn uv(&self, at: TrianglePoint) -> Vec2 {
+        let corners = self.corner_uvs(at.triangle);
+        let (f1, f2) = (corners[1] - corners[0], corners[2] - corners[0]);
+        (corners[0] + f1 * f64::from(at.u) + f2 * f64::from(at.v)).as_vec2()
+    }
+
     /// Bytes in memory, without the tree.
     pub fn bytes(&self) -> usize {
         let lists = size_of_val(self.positions.as_slice())
@@ -107,13 +138,12 @@ impl Mesh {
     /// Whether all of a triangle has one normal, which is its own, and one colour.
     pub fn is_flat(&self, triangle: u32) -> bool {
         let [a, b, c] = self.triangles[triangle as usize].map(|i| i as usize);
-        let is_one = |list: &[[f32; 3]]| list.is_empty() || list[a] == list[b] && list[b] == list[c];
         let is_own = || {
             let n = Vec3::from(self.normals[a]).as_dvec3().normalize_or_zero();
             let own = self.face_normal(triangle).normalize_or_zero();
             n == DVec3::ZERO || (n * n.dot(own).signum() - own).abs().max_element() <= SAME_NORMAL
         };
-        is_one(&self.normals) && is_one(&self.colors) && (self.normals.is_empty() || is_own())
+        is_one(&self.normals, [a, b, c]) && is_one(&self.colors, [a, b, c]) && (self.normals.is_empty() || is_own())
     }
 
     /// The part that a triangle belongs to.
@@ -234,10 +264,14 @@ impl Mesh {
         let color = if self.colors.is_empty() {
             Rgb::WHITE
         } else {
-            let of_corner = |i: u32| Vec3::from(self.colors[i as usize]).as_dvec3();
+            let of_corner = |i: u32| {
+                let [r, g, b, _] = self.colors[i as usize];
+                Vec3::new(r, g, b).as_dvec3()
+            };
             let c = blended(self.triangles[at.triangle as usize].map(of_corner), at);
             Rgb::new(c.x as f32, c.y as f32, c.z as f32)
         };
+        let alpha = self.alpha(at);
         ShapePoint {
             p: rounded,
             error,
@@ -247,6 +281,7 @@ impl Mesh {
             uv: uv.as_vec2(),
             footprint: Footprint { dx: footprint[0], dy: footprint[1], edges: [UvEdge::Unbounded; 2] },
             color,
+            alpha,
         }
     }
 

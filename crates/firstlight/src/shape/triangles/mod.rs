@@ -17,7 +17,7 @@ use crate::accel::{
     dispatch_sixteen, groups,
 };
 use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
-use kernel::{Crossings, intersect, intersect_lanes};
+use kernel::{Crossing, Crossings, intersect, intersect_lanes};
 pub(crate) use seen::{Eye, SeenParts, SeenTriangle, TOGETHER};
 
 /// Triangles in a leaf.
@@ -313,6 +313,44 @@ impl TriangleTree {
             return false;
         }
         self.any_below(simd, 0, ray, &self.slabs(ray), t_max, filter)
+    }
+
+    /// Where a ray meets a triangle with these corners, which it is known to meet.
+    pub fn meet(&self, ray: &TraceRay, corners: &[Vec3; 3], triangle: u32) -> Option<TriangleHit> {
+        let Crossing { t, u, v } = intersect(ray, &self.slabs(ray), corners)?;
+        Some(TriangleHit { t, u, v, triangle })
+    }
+
+    /// Visits every triangle on a ray, 0 < t <= `t_max`, in no order, until `hit` says so: whether it did.
+    #[inline(always)]
+    pub fn each<S: Simd>(&self, simd: S, ray: &TraceRay, t_max: f32, mut hit: impl FnMut(TriangleHit) -> bool) -> bool {
+        if !ray.is_valid {
+            return false;
+        }
+        let slabs = self.slabs(ray);
+        self.tree.any_below(
+            simd,
+            0,
+            &slabs,
+            t_max,
+            #[inline(always)]
+            |leaf| {
+                let pack = &self.packs[leaf as usize];
+                let mut mask = self.candidates(simd, ray, pack);
+                while mask != 0 {
+                    let place = mask.trailing_zeros() as usize % PACK;
+                    mask &= mask - 1;
+                    if let Some(Crossing { t, u, v }) = intersect(ray, &slabs, &pack.triangle(place))
+                        && t > 0.0
+                        && t <= t_max
+                        && hit(TriangleHit { t, u, v, triangle: pack.ids[place] })
+                    {
+                        return true;
+                    }
+                }
+                false
+            },
+        )
     }
 
     #[inline(always)]

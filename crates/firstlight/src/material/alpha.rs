@@ -1,0 +1,82 @@
+//! Alpha: how much of the light behind a surface it stops.
+//!
+//! Light goes straight through the rest. A *mask* is a surface with holes: each texel is there or not. A *blend* is a
+//! veil. Surfaces that are not opaque are met by rays only: see `scene/layers.rs`.
+
+use crate::describe::words;
+use crate::math::Vec2;
+use crate::shape::SurfaceInteraction;
+use crate::texture::{Param, Texture};
+
+words! {
+    /// What is made of the alpha of a material.
+    pub enum AlphaMode {
+        /// Nothing: the surface stops all light.
+        Opaque = "opaque",
+        /// The surface is there where its alpha is `cutoff` or more, and has a hole where it is less.
+        Mask = "mask",
+        /// The surface stops as much of the light behind it as its alpha says.
+        Blend = "blend",
+    }
+}
+
+/// The alpha of a material that is not opaque.
+#[derive(Clone, Copy, Debug)]
+pub struct Alpha {
+    /// 0 lets all light through, 1 none; of a mask the share that is there.
+    pub value: Param<f32>,
+    /// Of a mask: the least alpha of the vertices at which the surface is there.
+    pub cutoff: Option<f32>,
+}
+
+impl Alpha {
+    /// The part of a camera ray that the surface stops, 0 to 1: of a mask the share of the footprint that is there.
+    pub(crate) fn at_surface(&self, si: &SurfaceInteraction, textures: &[Texture]) -> f32 {
+        let value = self.value.number(si, textures, 1.0);
+        bounded(value * self.of_vertex(si.alpha))
+    }
+
+    /// The part of a shadow ray that the surface stops where it has such a texture coordinate and vertex alpha: 0 or 1
+    /// of a mask. Textures are read at their finest level.
+    pub(crate) fn at_point(&self, uv: Vec2, vertex: f32, textures: &[Texture]) -> f32 {
+        let texture = self.value.texture.map(|id| &textures[id.index()]);
+        let value = match (texture, self.cutoff) {
+            (None, _) => self.value.factor,
+            (Some(texture), None) => self.value.of(texture.at(uv)),
+            (Some(texture), Some(_)) => f32::from(texture.is_solid(uv)),
+        };
+        bounded(value * self.of_vertex(vertex))
+    }
+
+    /// What the alpha of vertices multiplies.
+    fn of_vertex(&self, alpha: f32) -> f32 {
+        self.cutoff.map_or(alpha, |cutoff| is_there(alpha, cutoff))
+    }
+}
+
+/// Whether a mask is there, as a number.
+fn is_there(alpha: f32, cutoff: f32) -> f32 {
+    if alpha >= cutoff { 1.0 } else { 0.0 }
+}
+
+/// From 0 to 1, also what is no number.
+fn bounded(alpha: f32) -> f32 {
+    if alpha > 0.0 { alpha.min(1.0) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn masks_are_there_or_not_and_blends_are_bounded() {
+        let blend = Alpha { value: Param::constant(0.5), cutoff: None };
+        assert_eq!([0.0, 0.5, 1.0].map(|vertex| blend.at_point(Vec2::ZERO, vertex, &[])), [0.0, 0.25, 0.5]);
+        let bright = Alpha { value: Param::constant(3.0), cutoff: None };
+        assert_eq!(bright.at_point(Vec2::ZERO, 1.0, &[]), 1.0);
+        assert_eq!(Alpha { value: Param::constant(f32::NAN), ..blend }.at_point(Vec2::ZERO, 1.0, &[]), 0.0);
+        // Of a mask the value is 0 or 1 already
+        let mask = Alpha { value: Param::constant(1.0), cutoff: Some(0.3) };
+        assert_eq!([0.29, 0.3, 1.0].map(|vertex| mask.at_point(Vec2::ZERO, vertex, &[])), [0.0, 1.0, 1.0]);
+    }
+}

@@ -1,0 +1,285 @@
+//! How much light layers let through to a surface: the product over all of them of 1 - alpha, in ascending order of
+//! surface and primitive, so that no traversal decides its bits. Masks are read at their finest level: 0 or 1.
+
+use std::cell::RefCell;
+
+use fearless_simd::{Level, Simd};
+
+use super::Scene;
+use super::geometry::{At, Geometry, Hit, PlacedSpot, PlacedTarget, UpperItem};
+use super::shadow_rays::{ShadowMesh, ShadowRays};
+use crate::accel::{TraceRay, dispatch_eight, dispatch_sixteen};
+use crate::ids::SurfaceId;
+use crate::math::{DRay, LANES, Ray, ShadowRay};
+use crate::shape::{RayDifferential, ShadowTerminator, TrianglePoint, bits};
+
+/// What is left of light by the layers on a ray.
+struct Veils<'a> {
+    scene: &'a Scene,
+    ray: &'a ShadowRay,
+    /// The factors that are neither 0 nor 1.
+    factors: Vec<LayerFactor>,
+}
+
+/// What one layer leaves.
+struct LayerFactor {
+    hit: Hit,
+    primitive: u32,
+    left: f32,
+}
+
+impl Scene {
+    /// The part of the light along a shadow ray that arrives, 0 to 1: 0 where anything opaque stands in the way, else
+    /// the product of 1 - alpha over the surfaces in between that are not opaque.
+    pub fn transmittance(&self, ray: &ShadowRay) -> f32 {
+        if self.occluded_by_opaque(ray) { 0.0 } else { self.left_by_layers(ray) }
+    }
+
+    /// The part that layers let through.
+    #[inline(always)]
+    pub(crate) fn left_by_layers(&self, ray: &ShadowRay) -> f32 {
+        if self.has_layers() { self.product_of_layers(ray) } else { 1.0 }
+    }
+
+    #[inline(never)]
+    fn product_of_layers(&self, ray: &ShadowRay) -> f32 {
+        let mut veils = Veils { scene: self, ray, factors: Vec::new() };
+        if self.geometry.pass_layers(self.level, &mut veils) { 0.0 } else { veils.product() }
+    }
+}
+
+impl Scene {
+    /// The parts of the light along the shadow rays in `active` that layers let through: the same as those of single
+    /// rays.
+    #[inline(never)]
+    pub(crate) fn left_by_layers16(&self, shadows: &ShadowRays, active: u16) -> [f32; LANES] {
+        let geometry = &*self.geometry;
+        let rays: [ShadowRay; LANES] = std::array::from_fn(|lane| shadows.ray(lane));
+        let mut veils = rays.each_ref().map(|ray| Veils { scene: self, ray, factors: Vec::new() });
+        let stopped = dispatch_sixteen!(
+            self.level,
+            simd => geometry.pass_layers16(simd, shadows, active, &RefCell::new(&mut veils)),
+            else {
+                let is_stopped = |lane: &usize| geometry.pass_layers(self.level, &mut veils[*lane]);
+                let lanes = (0..LANES).filter(|lane| active >> lane & 1 == 1);
+                lanes.filter(is_stopped).fold(0, |bits, lane| bits | 1 << lane)
+            }
+        );
+        let mut left = [0.0; LANES];
+        for (lane, (left, veils)) in left.iter_mut().zip(veils).enumerate() {
+            if active >> lane & 1 == 1 && stopped >> lane & 1 == 0 {
+                *left = veils.product();
+            }
+        }
+        left
+    }
+}
+
+/// The veils of sixteen rays, for filters of trees, which cannot change what they hold.
+type LaneVeils<'a, 'b> = RefCell<&'a mut [Veils<'b>; LANES]>;
+
+impl Veils<'_> {
+    /// Adds a layer; whether it stops all light.
+    fn add(&mut self, hit: Hit) -> bool {
+        let Veils { scene, ray, factors } = self;
+        let geometry = &*scene.geometry;
+        let surface = &geometry.surfaces[hit.surface.index()];
+        let material = surface.material.unwrap_or_else(|| geometry.face_material(&hit));
+        let Some(alpha) = scene.alpha_of(material) else { return true };
+        let (uv, vertex) = match hit.at {
+            At::Placed(index, PlacedSpot::Triangle(point)) => {
+                let PlacedTarget::Mesh(mesh) = geometry.placed[index as usize].target else { return false };
+                let mesh = &geometry.meshes[mesh as usize];
+                (mesh.uv(point), mesh.alpha(point))
+            }
+            _ => {
+                let line = Ray { o: ray.start, d: ray.l };
+                let point = geometry.point(&line, &hit, &RayDifferential::default(), ShadowTerminator::Hard);
+                (point.uv, point.alpha)
+            }
+        };
+        let alpha = alpha.at_point(uv, vertex, &scene.textures);
+        if alpha > 0.0 && alpha < 1.0 {
+            let primitive = geometry.primitive(&hit).unwrap_or(0);
+            factors.push(LayerFactor { hit, primitive, left: 1.0 - alpha });
+        }
+        alpha >= 1.0
+    }
+
+    /// The product of all factors.
+    fn product(mut self) -> f32 {
+        let geometry = &*self.scene.geometry;
+        let place = |one: &LayerFactor| (one.hit.surface, one.primitive);
+        self.factors.sort_by(|a, b| place(a).cmp(&place(b)).then_with(|| a.hit.t.total_cmp(&b.hit.t)));
+        let mut product = 1.0;
+        for (k, factor) in self.factors.iter().enumerate() {
+            // A surface without a seam is met once on the edges of its triangles
+            let mut before = self.factors[..k].iter().rev().take_while(|one| one.hit.surface == factor.hit.surface);
+            if !before.any(|one| geometry.are_neighbours(&one.hit, &factor.hit)) {
+                product *= factor.left;
+            }
+        }
+        product
+    }
+}
+
+impl Geometry {
+    /// Adds the layers on a shadow ray, until one stops all light: whether one does.
+    fn pass_layers(&self, level: Level, veils: &mut Veils) -> bool {
+        dispatch_eight!(level, simd => self.pass_layers_with(simd, veils))
+    }
+
+    #[inline(always)]
+    fn pass_layers_with<S: Simd>(&self, simd: S, veils: &mut Veils) -> bool {
+        let Some(layers) = &self.layers else { return false };
+        let ray = veils.ray;
+        if layers.unbounded.iter().any(|thing| self.pass_placed_layer(simd, *thing, veils)) {
+            return true;
+        }
+        layers.upper.any(simd, &TraceRay::new(ray.start, ray.l), ray.t_max, |item| match layers.items[item as usize] {
+            item @ (UpperItem::Sphere(_) | UpperItem::Parallelogram(_)) => self.pass_listed_layer(item, veils),
+            UpperItem::Placed(i) => self.pass_placed_layer(simd, i, veils),
+        })
+    }
+
+    /// The same for the rays in `active`: those that a layer stops.
+    #[inline(always)]
+    fn pass_layers16<S: Simd>(&self, simd: S, shadows: &ShadowRays, active: u16, veils: &LaneVeils) -> u16 {
+        let Some(layers) = &self.layers else { return 0 };
+        let mut done = 0;
+        for thing in &layers.unbounded {
+            done |= self.pass_placed_layer16(simd, *thing, shadows, active & !done, veils);
+        }
+        let whole = [shadows.from[0].t_max; LANES];
+        done | layers.upper.any16(simd, &shadows.rays, &whole, active & !done, |item, asking| {
+            match layers.items[item as usize] {
+                UpperItem::Placed(i) => self.pass_placed_layer16(simd, i, shadows, asking, veils),
+                item => one_by_one(asking, |lane| self.pass_listed_layer(item, &mut veils.borrow_mut()[lane])),
+            }
+        })
+    }
+
+    #[inline(never)]
+    fn pass_placed_layer16<S: Simd>(
+        &self,
+        simd: S,
+        index: u32,
+        shadows: &ShadowRays,
+        active: u16,
+        veils: &LaneVeils,
+    ) -> u16 {
+        let thing = &self.placed[index as usize];
+        let PlacedTarget::Mesh(_) = thing.target else {
+            return one_by_one(active, |lane| self.pass_placed_layer(simd, index, &mut veils.borrow_mut()[lane]));
+        };
+        let light = shadows.from[0].to.light;
+        let Some(mesh) = ShadowMesh::of(self, index + 1, light).filter(|_| self.stops(thing.shadow, light)) else {
+            return 0;
+        };
+        let own = mesh.own_rays(&shadows.rays, active);
+        let rays = own.as_ref().unwrap_or(&shadows.rays);
+        let stops = |triangle, hit: u64| {
+            if !mesh.casts(triangle) {
+                return 0;
+            }
+            let veils = &mut *veils.borrow_mut();
+            let corners = mesh.mesh.corners(triangle).map(|corner| corner.as_vec3());
+            let surface = SurfaceId(thing.surface.0 + mesh.mesh.part(triangle).surface);
+            let is_stopped = |lane: &usize| {
+                let ray = &mut veils[*lane];
+                !mesh.is_start(ray.ray, rays.o(*lane), triangle)
+                    && mesh.mesh.tree.meet(&rays.ray(*lane), &corners, triangle).is_some_and(|hit| {
+                        let point = TrianglePoint { triangle, u: hit.u, v: hit.v };
+                        let at = At::Placed(index, PlacedSpot::Triangle(point));
+                        ray.add(Hit { t: f64::from(hit.t), surface, at })
+                    })
+            };
+            bits(hit).filter(is_stopped).fold(0, |stopped, lane| stopped | 1 << lane)
+        };
+        simd.vectorize(
+            #[inline(always)]
+            || mesh.mesh.tree.any16(simd, rays, &shadows.t_end, active, &stops),
+        )
+    }
+
+    /// A sphere or a parallelogram of [`pass_layers`](Self::pass_layers).
+    #[inline(never)]
+    fn pass_listed_layer(&self, item: UpperItem, veils: &mut Veils) -> bool {
+        let ray = veils.ray;
+        match item {
+            UpperItem::Sphere(i) => {
+                let owned = &self.spheres[i as usize];
+                let line = DRay { o: ray.start.as_dvec3(), d: ray.l.as_dvec3() };
+                let within = [0.0, f64::from(ray.end())];
+                self.casts(owned.surface, ray.to.light)
+                    && owned
+                        .shape
+                        .crossings(&line, within, false)
+                        .into_iter()
+                        .flatten()
+                        .any(|t| veils.add(Hit { t, surface: owned.surface, at: At::Sphere(i) }))
+            }
+            UpperItem::Parallelogram(i) => {
+                let owned = &self.parallelograms[i as usize];
+                let crossing = || owned.shape.crossing(ray.start.as_dvec3(), ray.l.as_dvec3());
+                self.casts(owned.surface, ray.to.light)
+                    // Its own surface, and what is coplanar with it, is told apart as for opaque ones
+                    && owned.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite())
+                    && veils.add(Hit { t: crossing(), surface: owned.surface, at: At::Parallelogram(i) })
+            }
+            UpperItem::Placed(_) => false,
+        }
+    }
+
+    #[inline(never)]
+    fn pass_placed_layer<S: Simd>(&self, simd: S, index: u32, veils: &mut Veils) -> bool {
+        let (thing, ray) = (&self.placed[index as usize], veils.ray);
+        if !self.stops(thing.shadow, ray.to.light) {
+            return false;
+        }
+        let own = thing.placement.line(ray.start, ray.l);
+        let end = ray.end();
+        match thing.target {
+            PlacedTarget::Mesh(_) => {
+                let Some(mesh) = ShadowMesh::of(self, index + 1, ray.to.light) else { return false };
+                let (o, d) = (own.o.as_vec3(), own.d.as_vec3());
+                simd.vectorize(
+                    #[inline(always)]
+                    || {
+                        mesh.mesh.tree.each(simd, &TraceRay::new(o, d), end, |hit| {
+                            if !mesh.casts(hit.triangle) || mesh.is_start(ray, o, hit.triangle) {
+                                return false;
+                            }
+                            let surface = SurfaceId(thing.surface.0 + mesh.mesh.part(hit.triangle).surface);
+                            let point = TrianglePoint { triangle: hit.triangle, u: hit.u, v: hit.v };
+                            let at = At::Placed(index, PlacedSpot::Triangle(point));
+                            veils.add(Hit { t: f64::from(hit.t), surface, at })
+                        })
+                    },
+                )
+            }
+            PlacedTarget::Points(points) => {
+                self.point_sets[points as usize].each(simd, &own, end, false, |t, point| {
+                    veils.add(Hit { t, surface: thing.surface, at: At::Placed(index, PlacedSpot::Point(point)) })
+                })
+            }
+            PlacedTarget::Solid(solid) => {
+                let mut after = 0.0;
+                while let Some(hit) = self.solids[solid as usize].intersect(&own, after, end.into(), false) {
+                    let at = At::Placed(index, PlacedSpot::Part(hit.part));
+                    if veils.add(Hit { t: hit.t, surface: thing.surface, at }) {
+                        return true;
+                    }
+                    after = hit.t;
+                }
+                false
+            }
+        }
+    }
+}
+
+/// Those of the lanes in `active` that are `stopped`.
+#[inline(always)]
+fn one_by_one(active: u16, mut stopped: impl FnMut(usize) -> bool) -> u16 {
+    bits(active.into()).filter(|lane| stopped(*lane)).fold(0, |mask, lane| mask | 1 << lane)
+}
