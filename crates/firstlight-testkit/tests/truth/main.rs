@@ -19,6 +19,7 @@ mod known;
 mod links;
 mod many_lights;
 mod masks;
+mod materials;
 mod meshes;
 mod motion;
 mod near;

@@ -1,6 +1,8 @@
 //! Metals and dielectrics of some roughness: the material of glTF.
 
-use super::{Ambient, Bsdf, Colors, GgxLobe, Lobe, Material, MaterialCommonDesc, PerMoment, Reflection, ViewGeometry};
+use super::{
+    Ambient, Bsdf, Clearcoat, Colors, GgxLobe, Lobe, Material, MaterialCommonDesc, PerMoment, Reflection, ViewGeometry,
+};
 use crate::color::Rgb;
 use crate::context::CompileContext;
 use crate::describe::{ColorParam, NumberParam, table};
@@ -17,8 +19,11 @@ table! {
     /// distribution of Trowbridge and Reitz (GGX) with alpha = roughness^2, at least 0.003, and V Smith's
     /// height-correlated masking.
     ///
-    /// Sources: "glTF 2.0 specification", appendix B; its extensions KHR_materials_ior and KHR_materials_specular. As
-    /// there, rough dielectrics may reflect more light than arrives, at grazing angles.
+    /// A clear coat above reflects F = clearcoat (0.04 + 0.96 (1 - n.wo)^5) times pi x (n.wi) x V D of its own
+    /// roughness, and all else is seen through the rest, 1 - F.
+    ///
+    /// Sources: "glTF 2.0 specification", appendix B; its extensions KHR_materials_ior, KHR_materials_specular and
+    /// KHR_materials_clearcoat. As there, rough dielectrics may reflect more light than arrives, at grazing angles.
     ///
     /// ```toml
     /// [material.metallic-roughness.gold]
@@ -41,6 +46,10 @@ table! {
         pub specular_color: ColorParam = ColorParam::gray(1.0),
         /// The part of ambient light that arrives, 0 to 1.
         pub occlusion: NumberParam = NumberParam::constant(1.0),
+        /// The strength of a clear coat, 0 to 1.
+        pub clearcoat: NumberParam = NumberParam::constant(0.0),
+        /// The roughness of the clear coat, 0 to 1.
+        pub clearcoat_roughness: NumberParam = NumberParam::constant(0.0),
         ..common: MaterialCommonDesc,
     }
 }
@@ -55,7 +64,8 @@ pub struct MetallicRoughness {
     f0: f32,
     specular: Param<f32>,
     specular_color: Param<Rgb>,
-    occlusion: Param<f32>,
+    pub(super) occlusion: Param<f32>,
+    pub(super) coat: Option<Clearcoat>,
 }
 
 impl MetallicRoughnessDesc {
@@ -71,10 +81,16 @@ impl MetallicRoughnessDesc {
             [("metallic", &self.metallic), ("roughness", &self.roughness)].map(|(field, of)| unit(cx, field, of));
         let [specular, occlusion] =
             [("specular", &self.specular), ("occlusion", &self.occlusion)].map(|(field, of)| unit(cx, field, of));
+        let [strength, roughness_of_coat] =
+            [("clearcoat", &self.clearcoat), ("clearcoat_roughness", &self.clearcoat_roughness)]
+                .map(|(field, of)| unit(cx, field, of));
+        let has_coat = self.clearcoat != NumberParam::constant(0.0);
+        let coat = has_coat.then_some(Clearcoat { strength, roughness: roughness_of_coat });
         let base_color = params.color(cx, "base_color", &self.base_color);
         let specular_color = params.color(cx, "specular_color", &self.specular_color);
         let f0 = f0 * f0;
-        let reflection = MetallicRoughness { base_color, metallic, roughness, f0, specular, specular_color, occlusion };
+        let reflection =
+            MetallicRoughness { base_color, metallic, roughness, f0, specular, specular_color, occlusion, coat };
         Material { reflection: Reflection::MetallicRoughness(reflection), common: self.common.compile(cx, params) }
     }
 }
@@ -116,7 +132,7 @@ impl MetallicRoughness {
         PerMoment([diffuse, dielectric * rest + base_color * metallic, Rgb::gray(specular * rest + metallic)])
     }
 
-    /// The textures of its parameters, those of colours first.
+    /// The textures of its parameters but those of the coat, those of colours first.
     pub(super) fn textures(&self) -> [Option<TextureId>; 6] {
         let numbers = [self.metallic, self.roughness, self.specular, self.occlusion].map(|number| number.texture);
         let [metallic, roughness, specular, occlusion] = numbers;

@@ -5,6 +5,7 @@ mod ambient;
 mod blinn_phong;
 mod bsdf;
 mod classic;
+mod clearcoat;
 mod common;
 mod ggx;
 mod highlight;
@@ -22,6 +23,7 @@ pub use blinn_phong::{BlinnPhongDesc, BlinnPhongLobe};
 pub(crate) use bsdf::LOBE_NUMBERS;
 pub use bsdf::{Bsdf, Lobe, LobeKind};
 pub use classic::Classic;
+pub use clearcoat::Clearcoat;
 pub use common::{MaterialCommon, MaterialCommonDesc};
 pub use ggx::GgxLobe;
 pub(crate) use highlight::Highlight;
@@ -97,7 +99,35 @@ impl Material {
     pub fn bsdf(&self, si: &SurfaceInteraction, textures: &[Texture], ambient: &Ambient) -> Bsdf {
         let ambient = self.varies_with_view(ambient).then_some((ambient, ViewGeometry { ns: si.ns, wo: si.wo }));
         let color = |param: &Param<Rgb>| param.color(si, textures) * si.color;
-        self.evaluate(color, |param| param.number(si, textures, 1.0), ambient)
+        let bsdf = self.evaluate(color, |param| param.number(si, textures, 1.0), ambient);
+        match self.coat_reflectance(si, textures) {
+            None => bsdf,
+            Some(reflected) => bsdf.weighted(1.0 - reflected),
+        }
+    }
+
+    /// The clear coat at a surface, which is lit beside what is [below it](Self::bsdf).
+    pub fn coat_bsdf(&self, si: &SurfaceInteraction, textures: &[Texture], ambient: &Ambient) -> Option<Bsdf> {
+        let Reflection::MetallicRoughness(material) = &self.reflection else { return None };
+        let number = |param: &Param<f32>| param.number(si, textures, 1.0);
+        let occlusion = number(&material.occlusion).clamp(0.0, 1.0);
+        Some(material.coat?.evaluate(ambient, &ViewGeometry { ns: si.ns, wo: si.wo }, occlusion, number))
+    }
+
+    /// The part of light that the clear coat reflects towards the viewer, and takes from what is below it.
+    fn coat_reflectance(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Option<f32> {
+        let coat = self.coat()?;
+        let view = ViewGeometry { ns: si.ns, wo: si.wo };
+        Some(coat.reflectance(&view, |param| param.number(si, textures, 1.0)))
+    }
+
+    /// Its clear coat.
+    #[inline(always)]
+    fn coat(&self) -> Option<&Clearcoat> {
+        match &self.reflection {
+            Reflection::MetallicRoughness(material) => material.coat.as_ref(),
+            Reflection::Classic(_) | Reflection::Unlit(_) => None,
+        }
     }
 
     /// The same on any surface, if it is the same on all.
@@ -131,7 +161,7 @@ impl Material {
         let emissive = self.common.emissive.color(si, textures);
         match &self.reflection {
             Reflection::Unlit(radiance) => radiance.color(si, textures) * si.color + emissive,
-            _ => emissive,
+            _ => emissive * (1.0 - self.coat_reflectance(si, textures).unwrap_or(0.0)),
         }
     }
 
@@ -140,9 +170,14 @@ impl Material {
         matches!(self.reflection, Reflection::Unlit(_)) || !self.common.emissive.factor.is_black()
     }
 
-    /// Whether it may be the same all over a surface without textures, and emits nothing.
+    /// Whether its [`Bsdf`] is all of it: it emits no light, and has no coat.
+    pub(crate) fn is_one_bsdf(&self) -> bool {
+        !self.is_emissive() && self.coat().is_none()
+    }
+
+    /// Whether it may be the same all over a surface without textures.
     fn may_be_even(&self, ambient: &Ambient) -> bool {
-        !self.varies_with_view(ambient) && !self.is_emissive()
+        !self.varies_with_view(ambient) && self.is_one_bsdf()
     }
 
     /// Whether its answer to ambient light depends on the normal or on the viewer.
@@ -166,12 +201,13 @@ impl Material {
 
     /// The textures of its parameters, those of its common ones first.
     fn textures(&self) -> impl Iterator<Item = Option<TextureId>> {
-        let mut all = ArrayVec::<_, 8>::from_iter(self.common.textures());
+        let mut all = ArrayVec::<_, 12>::from_iter(self.common.textures());
         match &self.reflection {
             Reflection::Classic(classic) => all.extend(classic.textures()),
             Reflection::MetallicRoughness(material) => all.extend(material.textures()),
             Reflection::Unlit(radiance) => all.push(radiance.texture),
         }
+        all.extend(self.coat().into_iter().flat_map(Clearcoat::textures));
         all.into_iter()
     }
 
@@ -182,7 +218,7 @@ impl Material {
             None => Some(Rgb::BLACK),
             Some(id) => Some(textures[id.index()].contrast()? * param.factor),
         };
-        if self.is_emissive() {
+        if !self.is_one_bsdf() {
             return None;
         }
         match &self.reflection {

@@ -292,7 +292,7 @@ impl<'a> CellRenderer<'a> {
                     (block.shape, Some(block))
                 }
             };
-            let fragment = self.fragments.all.len();
+            let first = self.fragments.all.len();
             let number = self.pixels.len() as u32;
             match block {
                 Some(SurfaceBlock { bsdf, means: None, .. })
@@ -303,18 +303,23 @@ impl<'a> CellRenderer<'a> {
                 }
                 _ => self.trace(at, &[shape], counts),
             }
-            let Some(Fragment { mean, count, .. }) = self.fragments.all.get(fragment) else { continue };
-            let (mean, count) = (*mean, *count as f32);
-            let block = block.filter(|_| mean.is_constant);
-            for light in 0..lights {
-                match block.and_then(|block| self.grid.arriving(&block, light as usize, at)) {
-                    Some(moments) => {
-                        *self.term(fragment as u32, light) += mean.bsdf.colors.reflected(&(moments * count))
-                    }
-                    None => {
-                        self.queues[ShadingRate::Quadrant as usize].push(FragmentQuery::new(fragment as u32, light));
-                    }
+            // A coat is a fragment of its own
+            for fragment in first..self.fragments.all.len() {
+                self.queue_quadrants(fragment, block, at);
+            }
+        }
+    }
+
+    /// Adds the lights that the lighting grid has of the block of a fragment in pixel `at`, and queues the others.
+    fn queue_quadrants(&mut self, fragment: usize, block: Option<SurfaceBlock>, at: [u32; 2]) {
+        let Fragment { mean, count, .. } = self.fragments.all[fragment];
+        let block = block.filter(|_| mean.is_constant);
+        for light in 0..self.scene.lights.len() as u32 {
+            match block.and_then(|block| self.grid.arriving(&block, light as usize, at)) {
+                Some(moments) => {
+                    *self.term(fragment as u32, light) += mean.bsdf.colors.reflected(&(moments * count as f32))
                 }
+                None => self.queues[ShadingRate::Quadrant as usize].push(FragmentQuery::new(fragment as u32, light)),
             }
         }
     }

@@ -21,8 +21,8 @@ pub(crate) struct RayPoint {
     pub point: ShadingPoint,
     /// Column and row in the pixel of the ray.
     pub at: [u16; 2],
-    /// Whether it is a layer, or is seen through one.
-    pub through_layers: bool,
+    /// Whether it is one of several points of its ray: a layer, what is behind one, a coat, or what is below one.
+    pub is_layered: bool,
 }
 
 /// The number of shading points of a fragment.
@@ -47,8 +47,8 @@ pub(crate) struct Fragment {
     pub count: u32,
     /// The share of the pixel by which its errors are judged.
     pub share: f32,
-    /// Whether any of its rays has layers: others may fill the pixel too.
-    pub through_layers: bool,
+    /// Whether its rays have several points: other fragments may fill the pixel too.
+    pub is_layered: bool,
     /// Its center among [`Fragments::points`]; none if that cannot represent it.
     pub center: Range<usize>,
     /// Its quadrants among them, once they are computed: none if it is to be lit at each ray.
@@ -129,14 +129,14 @@ impl Fragments {
     /// for each ray unless `grouped`.
     pub fn add(&mut self, scene: &Scene, number: u32, at: [u32; 2], rays: &mut Vec<RayPoint>, grouped: bool) {
         let all = (scene.antialiasing * scene.antialiasing) as f32;
-        while let Some(RayPoint { shape, point, through_layers, .. }) = rays.first().copied() {
+        while let Some(RayPoint { shape, point, is_layered, .. }) = rays.first().copied() {
             let first = self.rays.len();
             let (mut is_first, mut last) = (true, None);
             let is_alike = |ray: &mut RayPoint| {
                 let is_same = || ray.shape == shape && (shape.is_some() || is_one_surface(&point, &ray.point));
                 // Of several layers of one surface on a ray, each is in a fragment of its own
                 let is_alike = std::mem::take(&mut is_first)
-                    || grouped && ray.through_layers == through_layers && last != Some(ray.at) && is_same();
+                    || grouped && ray.is_layered == is_layered && last != Some(ray.at) && is_same();
                 if is_alike {
                     last = Some(ray.at);
                 }
@@ -147,7 +147,7 @@ impl Fragments {
                 self.at.push(at);
             }
             let share = if grouped { (self.rays.len() - first) as f32 / all } else { 1.0 };
-            self.push(scene, number, at, shape, first, share, through_layers);
+            self.push(scene, number, at, shape, first, share, is_layered);
         }
     }
 
@@ -161,7 +161,7 @@ impl Fragments {
         shape: Option<VisibleShape>,
         first: usize,
         share: f32,
-        through_layers: bool,
+        is_layered: bool,
     ) {
         let rays = first..self.rays.len();
         let closed_form_budget = 1.0 / rays.len() as f32;
@@ -186,7 +186,7 @@ impl Fragments {
             mean,
             count: rays.len() as u32,
             share,
-            through_layers,
+            is_layered,
             center: points..self.points.len(),
             quadrants: None,
             rays,
@@ -226,7 +226,7 @@ impl Fragments {
             mean: MeanBsdf::constant(bsdf),
             count: n * n,
             share: 1.0,
-            through_layers: false,
+            is_layered: false,
             center: first..first,
             quadrants: Some(first..self.points.len()),
             rays: 0..0,

@@ -101,8 +101,7 @@ impl PixelSum {
             let mut stack = std::mem::take(&mut self.stack);
             scene.find_layers(ray, differential, end.as_ref(), &mut stack);
             for layer in &stack.layers {
-                let point = self.see_surface(scene, &layer.surface, layer.weight);
-                lit(self, point);
+                self.see_surface(scene, &layer.surface, layer.weight, &mut lit);
             }
             left = stack.left;
             self.stack = stack;
@@ -114,21 +113,28 @@ impl PixelSum {
             TracedHit::Background => self.terms.background += f64::from(left),
             TracedHit::Emission(radiance) => self.terms.emission.add(radiance, left.into()),
             TracedHit::Surface(si) => {
-                let point = self.see_surface(scene, &si, left);
-                lit(self, point);
+                self.see_surface(scene, &si, left, &mut lit);
             }
         }
     }
 
-    /// Adds what a surface emits, and its ambient light, times `weight`.
+    /// Adds what a surface emits, and its ambient light, times `weight`; the same of its coat. Calls `lit` with the
+    /// shading points of both.
     #[inline(always)]
-    fn see_surface(&mut self, scene: &Scene, si: &SurfaceInteraction, weight: f32) -> ShadingPoint {
-        // Evaluate the textures of the material
-        let bsdf = scene.bsdf(si).weighted(weight);
+    fn see_surface(
+        &mut self,
+        scene: &Scene,
+        si: &SurfaceInteraction,
+        weight: f32,
+        lit: &mut impl FnMut(&mut Self, ShadingPoint),
+    ) {
         self.terms.emission.add(scene.emission(si), weight.into());
-        let point = ShadingPoint::of(si, &bsdf, &scene.ambient);
-        self.terms.ambient += point.base;
-        point
+        // Evaluate the textures of the material
+        for bsdf in [Some(scene.bsdf(si)), scene.coat_bsdf(si)].into_iter().flatten() {
+            let point = ShadingPoint::of(si, &bsdf.weighted(weight), &scene.ambient);
+            self.terms.ambient += point.base;
+            lit(self, point);
+        }
     }
 
     /// Adds the moments of light `index` at a surface: the totals of [`LobeSums`].

@@ -215,10 +215,10 @@ impl VisibleShape {
     }
 
     /// The mean material over the camera rays of a pixel that sees only this shape; `None` where lobes differ, and of
-    /// materials that emit light.
+    /// materials that emit light or have a coat.
     pub fn mean_bsdf(self, scene: &Scene, pixel: [u32; 2]) -> Option<MeanBsdf> {
         let material = scene.geometry.surfaces[self.surface(scene).index()].material;
-        if material.is_some_and(|material| scene.materials[material.index()].is_emissive()) {
+        if material.is_some_and(|material| !scene.materials[material.index()].is_one_bsdf()) {
             return None;
         }
         if let Some(whole) = self.square_bsdf(scene, Square { x: pixel[0], y: pixel[1], side: 1 }) {

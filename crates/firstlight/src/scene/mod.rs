@@ -223,6 +223,12 @@ impl Scene {
         self.materials[si.material.index()].bsdf(si, &self.textures, &self.ambient)
     }
 
+    /// The clear coat at a surface, in numbers: it is lit beside its [material](Self::bsdf).
+    #[inline(always)]
+    pub(crate) fn coat_bsdf(&self, si: &SurfaceInteraction) -> Option<Bsdf> {
+        self.materials[si.material.index()].coat_bsdf(si, &self.textures, &self.ambient)
+    }
+
     /// The radiance that the material at a surface emits.
     #[inline]
     pub(crate) fn emission(&self, si: &SurfaceInteraction) -> Rgb {

@@ -135,8 +135,8 @@ impl CellRenderer<'_> {
             if self.is_open(number) {
                 self.trace_rays(number, counts);
             }
-            let Fragment { count, mean, rays, through_layers, .. } = &self.fragments.all[number];
-            if !through_layers && *count == self.rays_per_pixel() && !mean.lobes_differ && !rays.is_empty() {
+            let Fragment { count, mean, rays, is_layered, .. } = &self.fragments.all[number];
+            if !is_layered && *count == self.rays_per_pixel() && !mean.lobes_differ && !rays.is_empty() {
                 let pixel = self.pixel_of(number);
                 self.shadows.only[pixel] = number as u32;
             }

@@ -137,8 +137,10 @@ impl CellRenderer<'_> {
                 left = stack.left;
                 for Layer { surface, weight, .. } in &stack.layers {
                     pixel.terms.emission.add(scene.emission(surface), f64::from(*weight));
-                    let point = ShadingPoint::of(surface, &scene.bsdf(surface).weighted(*weight), &scene.ambient);
-                    points.push(RayPoint { shape: None, point, at, through_layers: true });
+                    for bsdf in [Some(scene.bsdf(surface)), scene.coat_bsdf(surface)].into_iter().flatten() {
+                        let point = ShadingPoint::of(surface, &bsdf.weighted(*weight), &scene.ambient);
+                        points.push(RayPoint { shape: None, point, at, is_layered: true });
+                    }
                 }
                 if left == 0.0 {
                     continue;
@@ -152,11 +154,13 @@ impl CellRenderer<'_> {
                 pixel.terms.emission.add(scene.lights[light].radiance, left.into());
                 continue;
             }
+            let mut coat = None;
             let point = match shape {
                 Some(shape) => {
                     let bsdf = self.fragments.plain_bsdf(scene, shape).unwrap_or_else(|| {
                         let si = shape.interaction(scene, ray, hit.t, &differential());
                         pixel.terms.emission.add(scene.emission(&si), left.into());
+                        coat = scene.coat_bsdf(&si);
                         scene.bsdf(&si)
                     });
                     let bsdf = bsdf.weighted(left);
@@ -165,10 +169,17 @@ impl CellRenderer<'_> {
                 None => {
                     let si = scene.local_surface(ray, &hit, &differential());
                     pixel.terms.emission.add(scene.emission(&si), left.into());
+                    coat = scene.coat_bsdf(&si);
                     ShadingPoint::of(&si, &scene.bsdf(&si).weighted(left), &scene.ambient)
                 }
             };
-            points.push(RayPoint { shape, point, at, through_layers: left != 1.0 });
+            let is_layered = left != 1.0 || coat.is_some();
+            points.push(RayPoint { shape, point, at, is_layered });
+            if let Some(bsdf) = coat {
+                let bsdf = bsdf.weighted(left);
+                let point = ShadingPoint { bsdf, base: bsdf.base(&scene.ambient), ..point };
+                points.push(RayPoint { shape, point, at, is_layered });
+            }
         }
         let number = self.pixels.len() as u32;
         self.pixels.push(pixel);
