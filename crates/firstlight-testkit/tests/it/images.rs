@@ -19,7 +19,7 @@ fn the_numbers_of_a_png_are_the_definition() {
     let picture = picture(67, 41);
     for encoding in [Encoding::Srgb, Encoding::Gamma(2.2), Encoding::Linear] {
         for exposure in [0.0, -1.5] {
-            let display = Display { encoding, exposure };
+            let display = Display { encoding, exposure, ..Display::default() };
             for (format, largest) in [(Format::Png8, 255.0), (Format::Png16, 65535.0)] {
                 let bytes = picture.encode(format, &display, &Receipt::default()).unwrap();
                 let stored = StoredImage::read(&bytes).unwrap();
@@ -40,7 +40,7 @@ fn an_exr_holds_the_film_to_the_bit() {
     picture.film = [640, 480];
     (picture.window.x, picture.window.y) = (600, 430);
     let receipt = Receipt { entries: vec![("scene_hash".into(), "9f1c".into())] };
-    let bytes = picture.encode(Format::Exr, &Display { encoding: Encoding::Srgb, exposure: 3.0 }, &receipt).unwrap();
+    let bytes = picture.encode(Format::Exr, &Display { exposure: 3.0, ..Display::default() }, &receipt).unwrap();
     let stored = StoredImage::read(&bytes).unwrap();
     assert_eq!((stored.film, stored.window), (picture.film, picture.window));
     // And says what it holds
