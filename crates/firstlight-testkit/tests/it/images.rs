@@ -44,8 +44,8 @@ fn neutral_shows_base_colors() {
     for base in [[0.7, 0.3, 0.2], [0.5, 0.5, 0.5], [0.16, 0.4, 0.78]] {
         let text = format!(
             "[render]\nwidth = 1\nheight = 1\nambient = 1\ndisplay = \"neutral\"\n[camera]\nposition = [0, 0, 3]\n\
-             projection = \"orthographic\"\nheight = 1\n[material.metallic-roughness.m]\nbase_color = {base:?}\nroughness = 1\n\
-             [[parallelogram]]\np = [-2, -2, 0]\ne0 = [4, 0, 0]\ne1 = [0, 4, 0]\nmaterial = \"m\"\n"
+             projection = \"orthographic\"\nheight = 1\n[material.metallic-roughness.m]\nbase_color = {base:?}\n\
+             roughness = 1\n[[parallelogram]]\np = [-2, -2, 0]\ne0 = [4, 0, 0]\ne1 = [0, 4, 0]\nmaterial = \"m\"\n"
         );
         let parsed = SceneDesc::parse("scene.toml", text.as_bytes(), &NoAssets);
         let scene = parsed.compile(&NoAssets, &CompileOptions::default()).unwrap_or_else(|e| panic!("{e}")).scene;

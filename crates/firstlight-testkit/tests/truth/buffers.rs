@@ -249,9 +249,9 @@ fn objects_are_told_in_their_own_space() {
 fn materials_are_seen_in_their_numbers() {
     let of_material = |material: &str| {
         let text = format!(
-            "[render]\nwidth = 2\nheight = 1\nantialiasing = 1\n[camera]\nposition = [0, 0, 5]\n[texture.checkerboard.half]\n\
-             counts = [2, 1]\ncolors = [0.25, 0.75]\n[material.{material}\n[[rectangle]]\ncenter = [0, 0, 0]\nsize = [20, 20]\n\
-             normal = [0, 0, 1]\n"
+            "[render]\nwidth = 2\nheight = 1\nantialiasing = 1\n[camera]\nposition = [0, 0, 5]\n\
+             [texture.checkerboard.half]\ncounts = [2, 1]\ncolors = [0.25, 0.75]\n[material.{material}\n\
+             [[rectangle]]\ncenter = [0, 0, 0]\nsize = [20, 20]\nnormal = [0, 0, 1]\n"
         );
         let text = text.replace("normal = [0, 0, 1]\n", "normal = [0, 0, 1]\nmaterial = \"m\"\n");
         let film =
