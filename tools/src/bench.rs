@@ -104,11 +104,11 @@ pub(crate) struct Difference {
 
 impl Difference {
     pub fn between(a: &Image, b: &Image, display: &Display) -> Difference {
-        let shown = |x: f32| display.encode(x).clamp(0.0, 1.0);
-        let steps = |a: f32, b: f32| 255.0 * (shown(a) - shown(b)).abs();
+        let shown = |[r, g, b, _]: [f32; 4]| display.encode_color([r, g, b]);
         let (mut worst, mut over, mut sum) = (0.0f64, 0, 0.0);
         for (a, b) in a.pixels.iter().zip(&b.pixels) {
-            let step = (0..3).map(|i| steps(a[i], b[i])).fold(0.0, f64::max);
+            let (a, b) = (shown(*a), shown(*b));
+            let step = (0..3).map(|i| 255.0 * (a[i] - b[i]).abs()).fold(0.0, f64::max);
             worst = worst.max(step);
             over += usize::from(step > 1.0);
             sum += step * step;

@@ -150,6 +150,7 @@ fn gather(name: &str, desc: &SceneDesc, compiled: &Compiled) -> Value {
         DisplayEncoding::Srgb => json!({ "encoding": "srgb", "exposure": render.exposure }),
         DisplayEncoding::Gamma => json!({ "encoding": "gamma", "gamma": render.gamma, "exposure": render.exposure }),
         DisplayEncoding::Linear => json!({ "encoding": "linear", "exposure": render.exposure }),
+        DisplayEncoding::Neutral => json!({ "encoding": "neutral", "exposure": render.exposure }),
     };
     json!({
         "scene": name,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use firstlight::{BufferView, Display, Encoding, Format, PlaneVec, StoredPlane, StoredPlanes, nearest_name};
+use firstlight::{BufferView, Display, Format, PlaneVec, StoredPlane, StoredPlanes, nearest_name};
 
 use crate::args::ViewBufferArgs;
 use crate::difference;
@@ -30,7 +30,7 @@ pub fn run(args: &ViewBufferArgs) -> Result<(), Failure> {
         numbers: numbers.numbers(),
         size: [file.window.width, file.window.height],
         range: args.range,
-        display: Display { encoding: Encoding::Srgb, exposure: args.exposure.unwrap_or(0.0) },
+        display: Display { exposure: args.exposure.unwrap_or(0.0), ..Display::default() },
     };
     let bytes = view.encode(&file.receipt).map_err(|e| Failure::Work(format!("{}: {e}", shown(&args.file))))?;
     let watch = Watch::begin();

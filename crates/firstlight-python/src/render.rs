@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use firstlight::{
     Compiled, Display, Encoding, FileSettings, Film, Format, NamedPlane, Plane, PlaneNumbers, PlaneVec, Receipt,
-    RenderSettings, Window, display_bytes, encode_planes, render, write_whole,
+    RenderSettings, ToneMapping, Window, display_bytes, encode_planes, render, write_whole,
 };
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
@@ -124,6 +124,7 @@ pub fn restored(
         Some(plane) => Ok((name, plane)),
         None => Err(PyValueError::new_err(format!("{name}: this version of firstlight has no plane {word}"))),
     };
+    let tone_mapping = if encoding == "neutral" { ToneMapping::Neutral } else { ToneMapping::None };
     let encoding = match encoding.as_str() {
         "gamma" => Encoding::Gamma(gamma),
         "linear" => Encoding::Linear,
@@ -134,7 +135,7 @@ pub fn restored(
         planes: names.into_iter().map(plane).collect::<PyResult<_>>()?,
         film,
         window: Window { x, y, width, height },
-        display: Display { encoding, exposure },
+        display: Display { encoding, exposure, tone_mapping },
         receipts: says.map(|entries| Receipt { entries }),
         camera: CameraMatrices { intrinsics: camera.0, world_from_camera: camera.1 },
         compiled: None,
@@ -505,6 +506,7 @@ impl PyRender {
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
         let names = self.planes.iter().map(|(name, plane)| (name.clone(), plane.name().to_owned())).collect();
         let (encoding, gamma) = match self.display.encoding {
+            _ if self.display.tone_mapping == ToneMapping::Neutral => ("neutral", 0.0),
             Encoding::Srgb => ("srgb", 0.0),
             Encoding::Gamma(gamma) => ("gamma", gamma),
             Encoding::Linear => ("linear", 0.0),

@@ -78,7 +78,7 @@ mod visibility;
 
 pub use accel::SimdLevel;
 pub use camera::{Camera, CameraDesc, FilmPlane, Frame, Orthographic, Pinhole, Projection};
-pub use color::{Display, Encoding, Rgb};
+pub use color::{Display, Encoding, Rgb, ToneMapping};
 pub use context::{AssetError, Assets, CompileStage, FolderAssets, MemoryAssets, NoAssets, OnCompile};
 pub use describe::nearest_name;
 pub use describe::{Channel, ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, SamplesDesc, ScaleDesc};

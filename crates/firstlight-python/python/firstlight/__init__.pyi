@@ -22,10 +22,11 @@ TEXTURES: list[str]
 Buffer = str | Literal[
     "color", "alpha", "background", "emission", "ambient", "diffuse", "specular", "rest", "shadow", "depth", "distance", "position",
     "position-camera", "position-object", "normal", "normal-camera", "normal-object", "normal-geometric",
-    "normal-geometric-camera", "tangent", "uv", "barycentric", "albedo", "object-id", "instance-id", "material-id",
-    "primitive-id", "face-orientation", "motion", "motion-backward", "depth:filtered", "distance:filtered",
+    "normal-geometric-camera", "tangent", "uv", "barycentric", "albedo", "roughness", "metallic", "opacity",
+    "object-id", "instance-id", "material-id", "primitive-id", "face-orientation", "motion", "motion-backward", "depth:filtered", "distance:filtered",
     "position:filtered", "position-camera:filtered", "normal:filtered", "normal-camera:filtered",
     "normal-geometric:filtered", "normal-geometric-camera:filtered", "uv:filtered", "albedo:filtered",
+    "roughness:filtered", "metallic:filtered",
     "coverage:background", "crypto-object", "crypto-instance", "crypto-material", "rays", "relight",
 ]
 # Three rows or four of four numbers, or a table of the scene format

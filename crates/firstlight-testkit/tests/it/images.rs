@@ -3,7 +3,10 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use firstlight::{Display, Encoding, Format, Image, Receipt, StoredImage, Window, Written, write_whole};
+use firstlight::{
+    CompileOptions, Display, Encoding, Format, Image, NoAssets, Receipt, RenderSettings, SceneDesc, StoredImage,
+    ToneMapping, Window, Written, render, write_whole,
+};
 
 fn picture(width: u32, height: u32) -> Image {
     let pixel = |i: u32| [(i % width) as f32 / width as f32, 0.5, (i / width) as f32 / height as f32, 1.0];
@@ -19,7 +22,7 @@ fn the_numbers_of_a_png_are_the_definition() {
     let picture = picture(67, 41);
     for encoding in [Encoding::Srgb, Encoding::Gamma(2.2), Encoding::Linear] {
         for exposure in [0.0, -1.5] {
-            let display = Display { encoding, exposure };
+            let display = Display { encoding, exposure, ..Display::default() };
             for (format, largest) in [(Format::Png8, 255.0), (Format::Png16, 65535.0)] {
                 let bytes = picture.encode(format, &display, &Receipt::default()).unwrap();
                 let stored = StoredImage::read(&bytes).unwrap();
@@ -34,13 +37,44 @@ fn the_numbers_of_a_png_are_the_definition() {
     }
 }
 
+/// Under gray light from everywhere the neutral display shows rough dielectrics in their base colours, to what the book
+/// says.
+#[test]
+fn neutral_shows_base_colors() {
+    for base in [[0.7, 0.3, 0.2], [0.5, 0.5, 0.5], [0.16, 0.4, 0.78]] {
+        let text = format!(
+            "[render]\nwidth = 1\nheight = 1\nambient = 1\ndisplay = \"neutral\"\n[camera]\nposition = [0, 0, 3]\n\
+             projection = \"orthographic\"\nheight = 1\n[material.metallic-roughness.m]\nbase_color = {base:?}\n\
+             roughness = 1\n[[parallelogram]]\np = [-2, -2, 0]\ne0 = [4, 0, 0]\ne1 = [0, 4, 0]\nmaterial = \"m\"\n"
+        );
+        let parsed = SceneDesc::parse("scene.toml", text.as_bytes(), &NoAssets);
+        let scene = parsed.compile(&NoAssets, &CompileOptions::default()).unwrap_or_else(|e| panic!("{e}")).scene;
+        let go_on = |_, _| std::ops::ControlFlow::Continue(());
+        let std::ops::ControlFlow::Continue((film, _)) = render(&scene, &RenderSettings::default(), &go_on) else {
+            unreachable!("nothing stops this render")
+        };
+        assert_eq!(scene.display().tone_mapping, ToneMapping::Neutral);
+        let picture = film.develop();
+        let bytes = picture.encode(Format::Png16, &scene.display(), &Receipt::default()).unwrap();
+        let stored = StoredImage::read(&bytes).unwrap();
+        for (channel, base) in base.into_iter().enumerate() {
+            let shown = Encoding::Srgb.decode(f64::from(stored.pixels[0][channel]));
+            assert!((shown - (0.96 * base - 0.028)).abs() < 0.003, "{base} is shown as {shown}");
+        }
+        // The receipt of the scene says how
+        let receipt = scene.receipt(&RenderSettings::default());
+        let bytes = picture.encode(Format::Png8, &scene.display(), &receipt).unwrap();
+        assert_eq!(StoredImage::read(&bytes).unwrap().receipt.get("display"), Some("neutral, exposure 0"));
+    }
+}
+
 #[test]
 fn an_exr_holds_the_film_to_the_bit() {
     let mut picture = picture(23, 50);
     picture.film = [640, 480];
     (picture.window.x, picture.window.y) = (600, 430);
     let receipt = Receipt { entries: vec![("scene_hash".into(), "9f1c".into())] };
-    let bytes = picture.encode(Format::Exr, &Display { encoding: Encoding::Srgb, exposure: 3.0 }, &receipt).unwrap();
+    let bytes = picture.encode(Format::Exr, &Display { exposure: 3.0, ..Display::default() }, &receipt).unwrap();
     let stored = StoredImage::read(&bytes).unwrap();
     assert_eq!((stored.film, stored.window), (picture.film, picture.window));
     // And says what it holds

@@ -207,6 +207,29 @@ fn the_alpha_of_vertices_multiplies() {
     assert_eq!([mesh(0.29), mesh(0.31)], [0.0, 1.0]);
 }
 
+/// The alpha of a texture and that of vertices are multiplied before the cutoff: each by itself is above it.
+#[test]
+fn a_mask_cuts_off_the_product_with_the_alpha_of_vertices() {
+    let mask = "[texture.checkerboard.gray]\ncounts = [1, 1]\ncolors = [0.8, 0.8]\n\
+                [material.phong.cut]\nalpha = { texture = \"gray\" }\nalpha_mode = \"mask\"\ncutoff = 0.5\n";
+    let corners = "positions = [[-3, -3, 0], [3, -3, 0], [0, 3, 0]]\ntriangles = [[0, 1, 2]]\n\
+                   uvs = [[0, 0], [1, 0], [0.5, 1]]\n";
+    let mesh =
+        |alpha: f64| format!("{mask}[[mesh]]\n{corners}alphas = [{alpha}, {alpha}, {alpha}]\nmaterial = \"cut\"\n");
+    let seen = |alpha: f64| pixel(&mesh(alpha), "transparent = true")[3];
+    assert_eq!([seen(0.6), seen(0.65), seen(1.0)], [0.0, 1.0, 1.0]);
+    // And so its shadow
+    let floor = "[[parallelogram]]\np = [-3, -3, -1]\ne0 = [6, 0, 0]\ne1 = [0, 6, 0]\n\
+                 [[light.directional]]\ndirection = [0, 0, -1]\n";
+    let lit = |alpha: f64| {
+        let text =
+            format!("[camera]\nposition = [9, 0, 1]\nlook_at = [0, 0, -1]\nfov_y_deg = 0.5\n{}{floor}", mesh(alpha));
+        let scene = scene(&format!("[render]\nwidth = 1\nheight = 1\n{text}"));
+        picture(&scene, &one_thread()).pixels[0][0] > 0.0
+    };
+    assert_eq!([lit(0.6), lit(0.65)], [true, false]);
+}
+
 #[test]
 fn light_behind_a_sheet_is_half_and_behind_a_mask_has_holes() {
     let floor = "[[parallelogram]]\np = [-3, -3, 0]\ne0 = [6, 0, 0]\ne1 = [0, 6, 0]\n";
@@ -347,7 +370,7 @@ fn ids_and_depth_are_of_the_first_layer_that_is_half_there() {
     );
     let scene = scene(&text);
     let objects = (0..3).map(|id| Buffer::Coverage(SurfaceId(id)));
-    let planes = [Plane::Color, Plane::ObjectId, Plane::Depth, Plane::BackgroundCoverage, Plane::Alpha];
+    let planes = [Plane::Color, Plane::ObjectId, Plane::Depth, Plane::BackgroundCoverage, Plane::Alpha, Plane::Opacity];
     let buffers: Vec<Buffer> = planes.into_iter().map(Buffer::from).chain(objects).collect();
     let film = film(&scene, &RenderSettings { buffers, ..one_thread() });
     assert_eq!(wholes(&film, Plane::ObjectId), [2]);
@@ -356,6 +379,8 @@ fn ids_and_depth_are_of_the_first_layer_that_is_half_there() {
     assert_eq!([share(0), share(1), share(2)], [0.4, 0.6 * 0.5, 0.6 * 0.5]);
     assert_eq!(floats(&film, Plane::BackgroundCoverage), [0.0]);
     assert_eq!(floats(&film, Plane::Alpha), [1.0]);
+    // But the opacity is that of the very first
+    assert_eq!(floats(&film, Plane::Opacity), [0.4]);
     // Rays of the library see the same
     let (ray, _) = scene.camera().ray(0.5, 0.5, 1.0);
     assert_eq!(scene.intersect(&ray).map(|hit| hit.surface), Some(SurfaceId(1)));

@@ -246,6 +246,39 @@ fn objects_are_told_in_their_own_space() {
 }
 
 #[test]
+fn materials_are_seen_in_their_numbers() {
+    let of_material = |material: &str| {
+        let text = format!(
+            "[render]\nwidth = 2\nheight = 1\nantialiasing = 1\n[camera]\nposition = [0, 0, 5]\n\
+             [texture.checkerboard.half]\ncounts = [2, 1]\ncolors = [0.25, 0.75]\n[material.{material}\n\
+             [[rectangle]]\ncenter = [0, 0, 0]\nsize = [20, 20]\nnormal = [0, 0, 1]\n"
+        );
+        let text = text.replace("normal = [0, 0, 1]\n", "normal = [0, 0, 1]\nmaterial = \"m\"\n");
+        let film =
+            film(&scene(&text), &of(&[Plane::Roughness, Plane::Metallic, Plane::Opacity, Plane::FilteredMetallic]));
+        let of = |plane| [floats(&film, plane)[0], floats(&film, plane)[1]];
+        assert_eq!(of(Plane::Metallic), of(Plane::FilteredMetallic));
+        assert_eq!(of(Plane::Opacity), [1.0; 2]);
+        [of(Plane::Roughness), of(Plane::Metallic)]
+    };
+    assert_eq!(of_material("metallic-roughness.m]\nroughness = 0.3\nmetallic = 0.75"), [[0.3; 2], [0.75; 2]]);
+    let textured = of_material("metallic-roughness.m]\nroughness = { texture = \"half\" }\nmetallic = 1");
+    let [mut left, mut right] = textured[0];
+    if left > right {
+        std::mem::swap(&mut left, &mut right);
+    }
+    // The area mean over a footprint is rounded
+    assert!((left - 0.25).abs() < 1e-6 && (right - 0.75).abs() < 1e-6, "{left} {right}");
+    assert_eq!(textured[1], [1.0; 2]);
+    // Blinn-Phong of exponent 30: alpha^2 = 2 / 32; Phong of a quarter of the exponent is as wide
+    let [blinn, phong] = [("blinn-phong", "30"), ("phong", "7.5")]
+        .map(|(kind, s)| of_material(&format!("{kind}.m]\nspecular = 0.5\nshininess = {s}")));
+    assert_eq!((blinn, phong), ([[0.5; 2], [0.0; 2]], [[0.5; 2], [0.0; 2]]));
+    assert_eq!(of_material("phong.m]\ndiffuse = 0.5"), [[1.0; 2], [0.0; 2]]);
+    assert_eq!(of_material("unlit.m]\ncolor = 0.5"), [[1.0; 2], [0.0; 2]]);
+}
+
+#[test]
 fn pixels_lead_to_the_world_and_back() {
     let turned = SCENE.replace("look_at = [0.1, 0, 0]", "look_at = [-3, 2, 1]\nup = [0.4, 1, 0.2]\nfov_y_deg = 80");
     for text in [SCENE, &turned] {

@@ -1,16 +1,19 @@
 //! Colour: linear Rec. 709 everywhere inside; sRGB and gamma only at the edges.
 
+mod coupling;
 mod display;
 mod names;
 mod quantize;
 mod ramp;
 mod steps;
+mod tone;
 
 pub use display::{Display, Encoding};
 pub(crate) use names::{CSS_COLORS, css_color};
 pub(crate) use quantize::Quantizer;
 pub(crate) use ramp::false_color;
 pub(crate) use steps::DisplaySteps;
+pub use tone::ToneMapping;
 
 use std::ops::{Add, AddAssign, Mul};
 

@@ -6,11 +6,14 @@
 //! number is then a table look-up by its leading bits, which say how many thresholds lie below its bucket, and a search
 //! among the thresholds inside the bucket: none or one for 8 bits and usual curves, a few for 16.
 
-use super::Display;
+use super::{Display, ToneMapping};
 use crate::parallel;
 
 /// The codes of one display and depth.
 pub(crate) struct Quantizer {
+    /// What is done to colours before the curve, if that is more than exposure.
+    tone: Option<Display>,
+    /// Without tone mapping: where there is one, the curve alone.
     display: Display,
     largest: u32,
     /// `thresholds[k - 1]`: the bits of the smallest positive f32 with code k or more; never falling. None of them if
@@ -38,8 +41,8 @@ struct Bucket {
 /// The bits of positive infinity: the last that a number can have here.
 const INFINITE: u32 = f32::INFINITY.to_bits();
 
-/// The code, 0 to `largest`, that a linear value has in a picture: what every faster way must agree with.
-/// Halves are rounded up; NaN is 0.
+/// The code, 0 to `largest`, that a linear value has in a picture without tone mapping: what every faster way must agree
+/// with. Halves are rounded up; NaN is 0.
 pub(crate) fn definition(display: &Display, largest: u32, linear: f32) -> u16 {
     (display.encode(linear) * f64::from(largest)).round() as u16
 }
@@ -48,11 +51,14 @@ impl Quantizer {
     /// For codes 0 to `largest`: 255 or 65535. `display` has no [`Display::fault`].
     pub(crate) fn new(display: &Display, largest: u32) -> Self {
         debug_assert!(display.fault().is_none() && (1..=65535).contains(&largest));
+        let (tone, display) = Self::apart(display);
         // Find each threshold, starting where the inverse curve says that it is
         let thresholds = parallel::map(largest as usize, 64, |i| {
             let k = i as u32 + 1;
             let edge = display.encoding.decode((f64::from(k) - 0.5) / f64::from(largest)) / display.factor();
-            smallest((edge as f32).to_bits(), |bits| u32::from(definition(display, largest, f32::from_bits(bits))) >= k)
+            smallest((edge as f32).to_bits(), |bits| {
+                u32::from(definition(&display, largest, f32::from_bits(bits))) >= k
+            })
         });
         debug_assert!(thresholds.is_sorted());
         // Count the thresholds in each bucket; 256 buckets an octave for 8 bits, 2048 for 16
@@ -70,7 +76,7 @@ impl Quantizer {
             });
             below += inside;
         }
-        Self { display: *display, largest, thresholds, buckets, first, shift }
+        Self { tone, display, largest, thresholds, buckets, first, shift }
     }
 
     /// As [`Quantizer::new`], for about `count` values: without thresholds where finding them would take longer than it
@@ -79,7 +85,23 @@ impl Quantizer {
         if count as u64 > 4 * u64::from(largest) {
             return Self::new(display, largest);
         }
-        Self { display: *display, largest, thresholds: Vec::new(), buckets: Vec::new(), first: 0, shift: 0 }
+        let (tone, display) = Self::apart(display);
+        Self { tone, display, largest, thresholds: Vec::new(), buckets: Vec::new(), first: 0, shift: 0 }
+    }
+
+    /// The tone mapping of a display, if it has one, and what is left to be done to each channel.
+    fn apart(display: &Display) -> (Option<Display>, Display) {
+        match display.tone_mapping {
+            ToneMapping::None => (None, *display),
+            ToneMapping::Neutral => (Some(*display), display.curve()),
+        }
+    }
+
+    /// The codes of a colour: those of [`Display::encode_color`].
+    #[inline]
+    pub(crate) fn codes(&self, color: [f32; 3]) -> [u16; 3] {
+        let shown = self.tone.as_ref().map_or(color, |display| display.shown(color));
+        shown.map(|channel| self.code(channel))
     }
 
     /// The code, 0 to `largest`, of a number from 0 to 1 that is not encoded, such as alpha. NaN is 0.
@@ -88,9 +110,9 @@ impl Quantizer {
         (f64::from(x).clamp(0.0, 1.0) * f64::from(largest)).round() as u16
     }
 
-    /// The code of a linear value: exactly [`definition`].
+    /// The code of a linear value that is not tone mapped any more: exactly [`definition`].
     #[inline]
-    pub(crate) fn code(&self, linear: f32) -> u16 {
+    fn code(&self, linear: f32) -> u16 {
         // NaN is not above 0
         let bits = if linear > 0.0 { linear.to_bits() } else { 0 };
         // Numbers before the first bucket share its code, numbers beyond the last that of the last
@@ -178,7 +200,7 @@ mod tests {
             Encoding::Linear,
         ] {
             for exposure in [0.0, 1.0, -2.0, 0.37, -64.0, 64.0] {
-                all.push(Display { encoding, exposure });
+                all.push(Display { encoding, exposure, ..Display::default() });
             }
         }
         all
@@ -204,8 +226,8 @@ mod tests {
     fn sixteen_bits_are_exact_at_every_threshold_and_its_neighbours() {
         for display in [
             Display::default(),
-            Display { encoding: Encoding::Gamma(2.2), exposure: 0.3 },
-            Display { encoding: Encoding::Linear, exposure: -5.0 },
+            Display { encoding: Encoding::Gamma(2.2), exposure: 0.3, ..Display::default() },
+            Display { encoding: Encoding::Linear, exposure: -5.0, ..Display::default() },
         ] {
             let quantizer = Quantizer::new(&display, 65535);
             for &t in &quantizer.thresholds {
@@ -248,7 +270,7 @@ mod tests {
     #[test]
     fn extreme_gammas_do_no_harm() {
         for gamma in [1e-300, 1e-3, 1e3, 1e300] {
-            let display = Display { encoding: Encoding::Gamma(gamma), exposure: 0.5 };
+            let display = Display { encoding: Encoding::Gamma(gamma), exposure: 0.5, ..Display::default() };
             let quantizer = Quantizer::new(&display, 65535);
             for x in [0.0, 1e-40, 1e-3, 0.5, 0.706, 0.708, 0.999, 1.0, 2.0, f32::INFINITY] {
                 agrees(&quantizer, &display, 65535, x);
@@ -259,9 +281,25 @@ mod tests {
     #[test]
     fn codes_survive_decoding() {
         for encoding in [Encoding::Srgb, Encoding::Gamma(2.2), Encoding::Linear] {
-            let quantizer = Quantizer::new(&Display { encoding, exposure: 0.0 }, 255);
+            let quantizer = Quantizer::new(&Display { encoding, ..Display::default() }, 255);
             for (k, x) in (0..256).map(|k| encoding.decode(k as f64 / 255.0) as f32).enumerate() {
                 assert_eq!(usize::from(quantizer.code(x)), k);
+            }
+        }
+    }
+
+    #[test]
+    fn colors_are_mapped_before_the_curve() {
+        let neutral = Display { exposure: -0.7, tone_mapping: ToneMapping::Neutral, ..Display::default() };
+        for display in [neutral, Display { exposure: 0.37, ..Display::default() }] {
+            for (largest, count) in [(255, usize::MAX), (65535, usize::MAX), (255, 1)] {
+                let quantizer = Quantizer::for_count(&display, largest, count);
+                for i in 0..2000_u16 {
+                    let color = [i % 13, i % 31, i % 7].map(|part| f32::from(part * part) * 0.011);
+                    let expected = display.encode_color(color).map(|c| (c * f64::from(largest)).round() as u16);
+                    assert_eq!(quantizer.codes(color), expected, "{display} {largest} {color:?}");
+                }
+                assert_eq!(quantizer.codes([f32::NAN, -1.0, 0.0]), [0; 3]);
             }
         }
     }

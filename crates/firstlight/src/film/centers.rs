@@ -55,7 +55,8 @@ fn fill_some(
     }
     let tile = film.tile;
     let has = |of: Plane| planes.iter().any(|(_, plane)| *plane == of);
-    let (has_motion, has_texture) = (has(Plane::Motion), has(Plane::Albedo));
+    let has_motion = has(Plane::Motion);
+    let has_texture = [Plane::Albedo, Plane::Roughness, Plane::Metallic].into_iter().any(has);
     let mut hits = PixelHits::new(level, 1);
     for block in tile.parts(hits.side(), 1) {
         hits.trace(scene, block);
@@ -63,9 +64,8 @@ fn fill_some(
             let ray = hits.ray([i, j]);
             let needs_differential = has_texture || scene.has_layers();
             let differential = if needs_differential { grid_ray(scene, 1, i, j).1 } else { RayDifferential::default() };
-            let center = scene
-                .shown(&ray, &differential, hits.get([i, j], 0, 0))
-                .map(|hit| Center::new(scene, ray, differential, hit));
+            let end = hits.get([i, j], 0, 0);
+            let center = scene.shown(&ray, &differential, end).map(|hit| Center::new(scene, ray, differential, hit));
             for (number, plane) in planes {
                 let value = match (&center, there) {
                     (Some(center), Some(there)) if *plane == Plane::Motion => {
@@ -73,6 +73,9 @@ fn fill_some(
                     }
                     (None, Some(there)) if *plane == Plane::Motion => {
                         CenterValue::Floats(motion::of_nothing(scene, there, &ray, level))
+                    }
+                    _ if *plane == Plane::Opacity => {
+                        CenterValue::Floats([scene.first_opacity(&ray, &differential, end), 0.0, 0.0])
                     }
                     (Some(center), _) => center.says(*plane),
                     (None, _) => nothing(*plane),
@@ -183,6 +186,15 @@ impl<'a> Center<'a> {
                 let Scene { materials, textures, .. } = self.scene;
                 let color = self.surface().map(|si| materials[si.material.index()].albedo(si, textures));
                 vector(color.map_or(Vec3::ZERO, |Rgb { r, g, b }| Vec3::new(r, g, b)))
+            }
+            Plane::Roughness | Plane::Metallic => {
+                let Scene { materials, textures, .. } = self.scene;
+                let of_metal = plane == Plane::Metallic;
+                let of = |si: &SurfaceInteraction| {
+                    let material = &materials[si.material.index()];
+                    if of_metal { material.metallic(si, textures) } else { material.roughness(si, textures) }
+                };
+                CenterValue::Floats([self.surface().map_or(0.0, of), 0.0, 0.0])
             }
             Plane::InstanceId => CenterValue::Whole(self.space().map_or(0, |space| space.instance)),
             Plane::Uv => vector(self.surface().map_or(Vec3::ZERO, |surface| surface.uv.extend(0.0))),

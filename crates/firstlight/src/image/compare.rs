@@ -194,17 +194,17 @@ impl StoredPlane {
         ["R", "G", "B"].iter().all(|name| self.channels.iter().any(|channel| channel == name))
     }
 
-    /// Its colours as they are displayed, over black: linear Rec. 709 after exposure. Those of 8 and 16 bits are
-    /// decoded as `display` says; others are multiplied by its exposure. `None` if it is none.
+    /// Its colours as they are displayed, over black: linear Rec. 709 after exposure and tone mapping. Those of 8 and 16
+    /// bits are decoded by the curve of `display`; others are multiplied by its exposure and tone mapped. `None` if it is
+    /// none.
     pub fn displayed(&self, display: &Display) -> Option<Vec<[f32; 3]>> {
         let pixels = self.rgba()?;
-        let factor = display.factor();
         Some(match self.steps {
             Some(_) => {
                 let decode = |c: f32, alpha: f32| (display.encoding.decode(c.into()) * f64::from(alpha)) as f32;
                 pixels.into_iter().map(|[r, g, b, a]| [r, g, b].map(|c| decode(c, a))).collect()
             }
-            None => pixels.into_iter().map(|[r, g, b, _]| [r, g, b].map(|c| (f64::from(c) * factor) as f32)).collect(),
+            None => pixels.into_iter().map(|[r, g, b, _]| display.shown([r, g, b])).collect(),
         })
     }
 }
@@ -275,7 +275,7 @@ pub fn relative_differences(a: &StoredPlane, b: &StoredPlane) -> Result<Vec<f32>
 }
 
 /// How far two pictures are apart as they are displayed, in steps of 8 bits: each pixel's largest difference of red,
-/// green and blue. `linear` holds light after exposure.
+/// green and blue. Both hold light after exposure and tone mapping.
 pub fn display_steps(a: &[[f32; 3]], b: &[[f32; 3]], encoding: Encoding) -> Vec<f32> {
     let apart = |a: f32, b: f32| (encoding.encode(a.into()) - encoding.encode(b.into())).abs() * 255.0;
     let pixel =

@@ -64,6 +64,15 @@ words! {
         Barycentric = "barycentric",
         /// The diffuse colour of its material there, texture and vertex colour looked up; 0 on lights.
         Albedo = "albedo",
+        /// The roughness of its material there, 0 to 1, the root of GGX's alpha; of the kinds with a `shininess` that of
+        /// the same width: (2 / (s + 2))^(1/4), s the exponent of Blinn-Phong or 4 times that of Phong. 1 where there is
+        /// no highlight; 0 on lights.
+        Roughness = "roughness",
+        /// How much of a metal its material is there, 0 to 1; 0 of all kinds but metallic-roughness, and on lights.
+        Metallic = "metallic",
+        /// The alpha, 0 to 1, of the first surface there, be it a veil that all other buffers pass through: 1 of what is
+        /// opaque, and of lights.
+        Opacity = "opacity",
         /// Which object it is, in scene order: 1 for the first shape, and the lights after all shapes. Each instance of
         /// a shape is an object of its own.
         ObjectId = "object-id",
@@ -105,6 +114,10 @@ words! {
         FilteredUv = "uv:filtered",
         /// The same of `albedo`.
         FilteredAlbedo = "albedo:filtered",
+        /// The same of `roughness`.
+        FilteredRoughness = "roughness:filtered",
+        /// The same of `metallic`.
+        FilteredMetallic = "metallic:filtered",
         /// The share of the pixel's camera rays that meet nothing. With the coverage of each object it adds up to 1.
         BackgroundCoverage = "coverage:background",
         /// Cryptomatte of objects: the six with the greatest shares of the pixel's camera rays, each as the hash of its
@@ -147,7 +160,8 @@ impl Plane {
             Color => &["R", "G", "B", "A"],
             Alpha => &["A"],
             Background | Emission | Ambient | Diffuse | Specular | Rest | Albedo => &["R", "G", "B"],
-            Shadow => &["Y"],
+            Shadow | Roughness | Metallic => &["Y"],
+            Opacity => &["A"],
             Depth | Distance => &["Z"],
             Position | PositionCamera | PositionObject => &["X", "Y", "Z"],
             Normal | NormalCamera | NormalObject | NormalGeometric | NormalGeometricCamera | Tangent => {
@@ -211,6 +225,9 @@ impl Plane {
             Background | Emission | Ambient | Diffuse | Specular | Rest => "a term of color",
             Shadow => "0 nothing arrives, 1 all",
             Albedo => "diffuse reflectance",
+            Roughness => "0 smooth, 1 rough",
+            Metallic => "0 dielectric, 1 metal",
+            Opacity => "0 lets all light through, 1 none",
             Depth => "along the line of sight, infinite for nothing",
             Distance => "along the ray, infinite for nothing",
             Position | PositionObject | Normal | NormalObject | NormalGeometric | Tangent => "right-handed, y up",
@@ -263,6 +280,8 @@ impl Plane {
             FilteredNormalGeometricCamera => Some(NormalGeometricCamera),
             FilteredUv => Some(Uv),
             FilteredAlbedo => Some(Albedo),
+            FilteredRoughness => Some(Roughness),
+            FilteredMetallic => Some(Metallic),
             _ => None,
         }
     }
@@ -276,6 +295,9 @@ impl Plane {
             Sampling::Center if self.is_whole() => {
                 "an id has no mean; how much of the pixel each thing has is in \"coverage:NAME\" and \"crypto-object\""
                     .to_owned()
+            }
+            Sampling::Center if self == Plane::Opacity => {
+                "how much all surfaces of the pixel cover of it is in \"alpha\"".to_owned()
             }
             Sampling::Center => format!("\"{name}\" is in a space of each object's own, and has no mean over several"),
         }

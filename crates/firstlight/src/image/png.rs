@@ -97,10 +97,11 @@ pub fn display_bytes(pixels: &[[f32; 4]], display: &Display, alpha: bool) -> Res
 fn quantize(window: Window, pixels: &[[f32; 4]], depth: Depth, display: &Display, alpha: bool) -> Vec<u8> {
     let largest = depth.largest();
     let color = Quantizer::for_count(display, largest, pixels.len().saturating_mul(3));
-    let rgb = |[r, g, b, _]: [f32; 4]| [color.code(r), color.code(g), color.code(b)];
+    let rgb = |[r, g, b, _]: [f32; 4]| color.codes([r, g, b]);
     let rgba = |pixel| {
         let [r, g, b, a] = straight(pixel);
-        [color.code(r), color.code(g), color.code(b), Quantizer::linear(a, largest)]
+        let [r, g, b] = color.codes([r, g, b]);
+        [r, g, b, Quantizer::linear(a, largest)]
     };
     match (depth, alpha) {
         (Depth::Eight, false) => each(window, pixels, |p| rgb(p).map(|code| code as u8)),
@@ -254,7 +255,11 @@ mod tests {
     }
 
     fn encoded(picture: &Image, format: Format, encoding: Encoding, exposure: f64) -> (codec::Info<'static>, Vec<u8>) {
-        decode(&picture.encode(format, &Display { encoding, exposure }, &Receipt::default()).unwrap())
+        decode(
+            &picture
+                .encode(format, &Display { encoding, exposure, ..Display::default() }, &Receipt::default())
+                .unwrap(),
+        )
     }
 
     #[test]
@@ -280,7 +285,7 @@ mod tests {
         let picture = whole(4, 1, |x, _| pixels[x as usize]);
         let (info, samples) = encoded(&picture, Format::Png8, Encoding::Srgb, 0.0);
         assert_eq!(info.color_type, codec::ColorType::Rgba);
-        let display = Display { encoding: Encoding::Srgb, exposure: 0.0 };
+        let display = Display::default();
         assert_eq!(display_bytes(&pixels, &display, true).unwrap(), samples);
         // On black, 0.25 is 137, whatever covers it
         let on_black = display_bytes(&pixels, &display, false).unwrap();
@@ -342,7 +347,7 @@ mod tests {
     #[test]
     fn a_broken_display_is_an_error() {
         let picture = whole(1, 1, |_, _| [0.5; 4]);
-        let display = Display { encoding: Encoding::Gamma(-1.0), exposure: 0.0 };
+        let display = Display { encoding: Encoding::Gamma(-1.0), ..Display::default() };
         let fault = picture.encode(Format::Png8, &display, &Receipt::default()).unwrap_err().to_string();
         assert_eq!(fault, "gamma -1 is not a finite number greater than 0");
     }

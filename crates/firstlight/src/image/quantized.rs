@@ -96,7 +96,7 @@ impl NumberKind {
         use Plane::*;
         match plane.of_each_ray().unwrap_or(plane) {
             Color | Background | Emission | Ambient | Diffuse | Specular | Rest | Albedo => NumberKind::Color,
-            Alpha | Shadow | BackgroundCoverage => NumberKind::Share,
+            Alpha | Shadow | BackgroundCoverage | Roughness | Metallic | Opacity => NumberKind::Share,
             Depth | Distance => NumberKind::Distance,
             Normal | NormalCamera | NormalObject | NormalGeometric | NormalGeometricCamera | Tangent => {
                 NumberKind::Direction

@@ -173,8 +173,11 @@ impl BufferView<'_> {
             Look::Id => (each(&|pixel| of_id(at(pixel, 0) as u32)), None),
             Look::Color => {
                 let channels = axes(["R", "G", "B"]);
-                let code = |linear: f64| (self.display.encode(linear as f32) * 255.0).round() as u8;
-                (each(&|pixel| channels.map(|channel| code(at(pixel, channel)))), None)
+                let color = |pixel: usize| {
+                    let linear = channels.map(|channel| at(pixel, channel) as f32);
+                    self.display.encode_color(linear).map(|encoded| (encoded * 255.0).round() as u8)
+                };
+                (each(&color), None)
             }
             Look::Direction => {
                 let channels = axes(["X", "Y", "Z"]);

@@ -188,15 +188,11 @@ pub(crate) struct Weight(pub [f32; MOMENTS]);
 
 impl Weight {
     /// For light of colours `worth` times the moments, within the total `value`, and an allowed error in display steps.
-    /// `least`: see [`DisplaySteps::slope`].
+    /// `least`: see [`DisplaySteps::slopes`].
     #[inline(always)]
     pub fn new(steps: &DisplaySteps, value: Rgb, worth: &Colors, allowed: f32, least: f32) -> Weight {
-        let used = if value.r == value.g && value.g == value.b {
-            [steps.slope(value.r, least) / allowed; 3]
-        } else {
-            [value.r, value.g, value.b].map(|value| steps.slope(value, least) / allowed)
-        };
-        Weight(worth.0.map(|worth| (worth.r * used[0]).max(worth.g * used[1]).max(worth.b * used[2])))
+        let slopes = steps.slopes(value, least, allowed);
+        Weight(worth.0.map(|worth| slopes.of(worth)))
     }
 
     /// The part of the allowed error that `errors` use up.

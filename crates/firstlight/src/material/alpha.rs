@@ -25,13 +25,19 @@ words! {
 pub struct Alpha {
     /// 0 lets all light through, 1 none; of a mask the share that is there.
     pub value: Param<f32>,
-    /// Of a mask: the least alpha of the vertices at which the surface is there.
+    /// Of a mask: the least alpha at which the surface is there.
     pub cutoff: Option<f32>,
+    /// Of a mask: the alpha before the cutoff, where vertices may have an alpha that multiplies it.
+    pub unmasked: Option<Param<f32>>,
 }
 
 impl Alpha {
-    /// The part of a camera ray that the surface stops, 0 to 1: of a mask the share of the footprint that is there.
+    /// The part of a camera ray that the surface stops, 0 to 1: of a mask the share of the footprint that is there, where
+    /// vertices have an alpha of their own 0 or 1.
     pub(crate) fn at_surface(&self, si: &SurfaceInteraction, textures: &[Texture]) -> f32 {
+        if let Some(product) = self.product(si.uv, si.alpha, textures) {
+            return product;
+        }
         let value = self.value.number(si, textures, 1.0);
         bounded(value * self.of_vertex(si.alpha))
     }
@@ -39,6 +45,9 @@ impl Alpha {
     /// The part of a shadow ray that the surface stops where it has such a texture coordinate and vertex alpha: 0 or 1
     /// of a mask. Textures are read at their finest level.
     pub(crate) fn at_point(&self, uv: Vec2, vertex: f32, textures: &[Texture]) -> f32 {
+        if let Some(product) = self.product(uv, vertex, textures) {
+            return product;
+        }
         let texture = self.value.texture.map(|id| &textures[id.index()]);
         let value = match (texture, self.cutoff) {
             (None, _) => self.value.factor,
@@ -46,6 +55,14 @@ impl Alpha {
             (Some(texture), Some(_)) => f32::from(texture.is_solid(uv)),
         };
         bounded(value * self.of_vertex(vertex))
+    }
+
+    /// Of a mask with an alpha at the vertices: whether the product of both is there, as a number. Textures are read at
+    /// their finest level.
+    fn product(&self, uv: Vec2, vertex: f32, textures: &[Texture]) -> Option<f32> {
+        let (cutoff, alpha) = (self.cutoff?, self.unmasked.as_ref().filter(|_| vertex != 1.0)?);
+        let alpha = alpha.texture.map_or(alpha.factor, |id| alpha.of(textures[id.index()].at(uv)));
+        Some(is_there(alpha * vertex, cutoff))
     }
 
     /// What the alpha of vertices multiplies.
@@ -70,13 +87,16 @@ mod tests {
 
     #[test]
     fn masks_are_there_or_not_and_blends_are_bounded() {
-        let blend = Alpha { value: Param::constant(0.5), cutoff: None };
+        let blend = Alpha { value: Param::constant(0.5), cutoff: None, unmasked: None };
         assert_eq!([0.0, 0.5, 1.0].map(|vertex| blend.at_point(Vec2::ZERO, vertex, &[])), [0.0, 0.25, 0.5]);
-        let bright = Alpha { value: Param::constant(3.0), cutoff: None };
+        let bright = Alpha { value: Param::constant(3.0), ..blend };
         assert_eq!(bright.at_point(Vec2::ZERO, 1.0, &[]), 1.0);
         assert_eq!(Alpha { value: Param::constant(f32::NAN), ..blend }.at_point(Vec2::ZERO, 1.0, &[]), 0.0);
         // Of a mask the value is 0 or 1 already
-        let mask = Alpha { value: Param::constant(1.0), cutoff: Some(0.3) };
+        let mask = Alpha { value: Param::constant(1.0), cutoff: Some(0.3), unmasked: None };
         assert_eq!([0.29, 0.3, 1.0].map(|vertex| mask.at_point(Vec2::ZERO, vertex, &[])), [0.0, 1.0, 1.0]);
+        // With an alpha of vertices the product counts
+        let thin = Alpha { unmasked: Some(Param::constant(0.5)), ..mask };
+        assert_eq!([0.59, 0.61, 1.0].map(|vertex| thin.at_point(Vec2::ZERO, vertex, &[])), [0.0, 1.0, 1.0]);
     }
 }

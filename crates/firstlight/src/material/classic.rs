@@ -5,7 +5,8 @@ use crate::color::Rgb;
 use crate::context::CompileContext;
 use crate::describe::{ColorParam, NumberParam};
 use crate::ids::TextureId;
-use crate::texture::{Param, Params};
+use crate::shape::SurfaceInteraction;
+use crate::texture::{Param, Params, Texture};
 
 /// A diffuse part and a highlight, their parameters still to be looked up.
 #[derive(Clone, Copy, Debug)]
@@ -81,6 +82,20 @@ impl Classic {
         let ambient = ambient.map_or(answer, |(ambient, view)| ambient.answer(&view, answer, Rgb::BLACK));
         let colors = PerMoment([diffuse, specular, Rgb::BLACK]);
         Bsdf { colors, ambient, lobe }
+    }
+
+    /// The roughness of a microfacet highlight of the same width: with alpha^2 = 2 / (s + 2) the distributions of GGX and
+    /// of Blinn-Phong of exponent s agree at the peak to second order. Phong's highlight is as wide as Blinn-Phong's of 4
+    /// times the exponent. 1 without a highlight.
+    ///
+    /// Source: Walter, Marschner, Li, Torrance, "Microfacet models for refraction", 2007 (the exponent).
+    pub(super) fn roughness(&self, si: &SurfaceInteraction, textures: &[Texture]) -> f32 {
+        if self.specular.color(si, textures).is_black() {
+            return 1.0;
+        }
+        let shininess = self.shininess.number(si, textures, 1.0).clamp(0.0, MAX_SHININESS);
+        let exponent = if self.lobe == LobeKind::Phong { 4.0 * shininess } else { shininess };
+        (2.0 / (exponent + 2.0)).sqrt().sqrt()
     }
 
     /// The textures of its colours, and of its numbers.

@@ -17,8 +17,7 @@ table! {
         pub emissive: ColorParam = ColorParam::gray(0.0),
         /// Multiplies `emissive`: 0 to 1e6.
         pub emissive_strength: f64 = 1.0,
-        /// How much of the light behind the surface it stops: 0 to 1. The alpha of the vertices of a mesh multiplies
-        /// that of a blend; a mask is there where both are at or above the cutoff.
+        /// How much of the light behind the surface it stops: 0 to 1. The alpha of the vertices of a mesh multiplies it.
         pub alpha: NumberParam = NumberParam::constant(1.0),
         /// What is made of `alpha`.
         pub alpha_mode: AlphaMode = AlphaMode::Opaque,
@@ -63,11 +62,11 @@ impl MaterialCommonDesc {
             }
             AlphaMode::Mask => {
                 let share = params.mask(cx, "alpha", &self.alpha, cutoff);
-                Some(Alpha { value: share, cutoff: Some(cutoff as f32) })
+                Some(Alpha { value: share, cutoff: Some(cutoff as f32), unmasked: params.unmasked(&self.alpha) })
             }
             AlphaMode::Blend => {
                 let value = params.number(cx, "alpha", &self.alpha, [0.0, 1.0]);
-                Some(Alpha { value, cutoff: None })
+                Some(Alpha { value, cutoff: None, unmasked: None })
             }
         }
     }

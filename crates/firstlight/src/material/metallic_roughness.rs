@@ -58,8 +58,8 @@ table! {
 #[derive(Clone, Copy, Debug)]
 pub struct MetallicRoughness {
     pub(super) base_color: Param<Rgb>,
-    metallic: Param<f32>,
-    roughness: Param<f32>,
+    pub(super) metallic: Param<f32>,
+    pub(super) roughness: Param<f32>,
     /// The reflectance of dielectrics seen from the front, before `specular_color`.
     f0: f32,
     specular: Param<f32>,

@@ -199,6 +199,24 @@ impl Material {
         color.color(si, textures) * si.color
     }
 
+    /// The roughness of its highlight, 0 to 1: that of GGX; of a power of a cosine the one of the same width. 1 without a
+    /// highlight.
+    pub(crate) fn roughness(&self, si: &SurfaceInteraction, textures: &[Texture]) -> f32 {
+        match &self.reflection {
+            Reflection::Classic(classic) => classic.roughness(si, textures),
+            Reflection::MetallicRoughness(material) => material.roughness.number(si, textures, 1.0).clamp(0.0, 1.0),
+            Reflection::Unlit(_) => 1.0,
+        }
+    }
+
+    /// How much of a metal it is, 0 to 1.
+    pub(crate) fn metallic(&self, si: &SurfaceInteraction, textures: &[Texture]) -> f32 {
+        match &self.reflection {
+            Reflection::MetallicRoughness(material) => material.metallic.number(si, textures, 1.0).clamp(0.0, 1.0),
+            Reflection::Classic(_) | Reflection::Unlit(_) => 0.0,
+        }
+    }
+
     /// The textures of its parameters, those of its common ones first.
     fn textures(&self) -> impl Iterator<Item = Option<TextureId>> {
         let mut all = ArrayVec::<_, 12>::from_iter(self.common.textures());

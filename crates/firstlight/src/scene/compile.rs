@@ -17,7 +17,7 @@ use super::seen_lights::SeenLights;
 use super::textures::{TextureRequests, Textures};
 use super::{Choices, DisplayEncoding, RenderDesc, Scene, SceneDesc, SceneSummary};
 use crate::camera::{Camera, CameraDesc};
-use crate::color::{Display, Encoding, Rgb};
+use crate::color::{Display, Encoding, Rgb, ToneMapping};
 use crate::context::{Assets, CompileContext, OnCompile};
 use crate::describe::{Family, SamplesDesc};
 use crate::error::{Diagnostic, SceneError, Severity};
@@ -228,10 +228,11 @@ impl SceneDesc {
             let gamma = cx.between("gamma", render.gamma, 0.1, 10.0, Some("2.2 is usual"));
             let exposure = cx.between("exposure", render.exposure, -64.0, 64.0, Some("in stops: each doubles"));
             cx.between("fps", render.fps, MIN_FPS, MAX_FPS, Some("frames in a second"));
-            let encoding = match render.display {
-                DisplayEncoding::Srgb => Encoding::Srgb,
-                DisplayEncoding::Gamma => Encoding::Gamma(gamma),
-                DisplayEncoding::Linear => Encoding::Linear,
+            let (encoding, tone_mapping) = match render.display {
+                DisplayEncoding::Srgb => (Encoding::Srgb, ToneMapping::None),
+                DisplayEncoding::Gamma => (Encoding::Gamma(gamma), ToneMapping::None),
+                DisplayEncoding::Linear => (Encoding::Linear, ToneMapping::None),
+                DisplayEncoding::Neutral => (Encoding::Srgb, ToneMapping::Neutral),
             };
             Picture {
                 width,
@@ -240,7 +241,7 @@ impl SceneDesc {
                 tolerance,
                 background: cx.color("background", render.background),
                 ambient: render.ambient.compile(cx),
-                display: Display { encoding, exposure },
+                display: Display { encoding, exposure, tone_mapping },
             }
         })
     }

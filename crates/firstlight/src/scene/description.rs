@@ -18,6 +18,9 @@ words! {
         Gamma = "gamma",
         /// As it is.
         Linear = "linear",
+        /// The PBR Neutral tone mapper of Khronos, then the sRGB curve: base colours as they are, highlights above 0.8
+        /// compressed.
+        Neutral = "neutral",
     }
 }
 

@@ -121,6 +121,18 @@ impl Scene {
         found.iter().find(is_shown).map(|one| one.hit).or(end)
     }
 
+    /// The alpha of the first surface on a camera ray that has one above 0, or of the opaque thing at its `end`; 0 of
+    /// nothing.
+    pub(crate) fn first_opacity(&self, ray: &Ray, differential: &RayDifferential, end: Option<Hit>) -> f32 {
+        let mut found = Vec::new();
+        if self.has_layers() {
+            self.collect_layers(ray, end.as_ref(), &mut found);
+        }
+        let mut alphas = found.iter().map(|one| self.layer_at(ray, &one.hit, differential).1);
+        let of_end = if end.is_some() { 1.0 } else { 0.0 };
+        alphas.find(|alpha| *alpha > 0.0).unwrap_or(of_end)
+    }
+
     /// Calls `found` with the surfaces of all layers on a camera ray with an alpha of at least one half.
     pub(super) fn meet_all_layers(&self, ray: &Ray, mut found: impl FnMut(SurfaceId)) {
         if self.has_layers() {

@@ -14,7 +14,7 @@ use crate::describe::{Channel, ColorDesc, ColorParam, FilePath, NumberParam};
 use crate::ids::TextureId;
 use crate::image::ImageError;
 use crate::image::read::{Limits, PictureHeader, decode, read_header};
-use crate::shape::{CompileCache, key_of};
+use crate::shape::{CompileCache, ShapeDesc, key_of};
 use crate::texture::{
     CheckerboardDesc, ImageTextureDesc, MaskRule, Param, Params, Pyramid, Texture, TextureDesc, TextureSpace,
     TextureUse,
@@ -425,6 +425,17 @@ impl Params for TextureRequests<'_> {
         Param { texture: Some(self.request(index, TextureUse::Mask(rule))), ..Param::constant(1.0) }
     }
 
+    fn unmasked(&mut self, param: &NumberParam) -> Option<Param<f32>> {
+        let (desc, scratch) = (self.desc, &mut CompileContext::default());
+        let grouped = desc.groups.iter().flat_map(|(_, group)| &group.shapes);
+        let may_have_alphas = |shape: &ShapeDesc| match shape {
+            ShapeDesc::Mesh(mesh) => !mesh.alphas.is_empty() || mesh.file.as_ref().is_some_and(is_ply),
+            _ => false,
+        };
+        let is_needed = desc.shapes.iter().chain(grouped).any(may_have_alphas);
+        is_needed.then(|| self.number(scratch, "alpha", param, [0.0, 1.0]))
+    }
+
     fn normals(&mut self, cx: &mut CompileContext, field: &str, texture: &str) -> Option<TextureId> {
         let index = self.find(cx, field, texture)?;
         let kind = self.desc.textures[index].1.kind();
@@ -435,6 +446,11 @@ impl Params for TextureRequests<'_> {
         }
         Some(self.request(index, TextureUse::Normal))
     }
+}
+
+/// Whether a file is named as PLY files are, whose vertices may have an alpha.
+fn is_ply(file: &FilePath) -> bool {
+    file.0.as_bytes().last_chunk().is_some_and(|end: &[u8; 4]| end.eq_ignore_ascii_case(b".ply"))
 }
 
 /// Where the number of a parameter stands: a constant is the field itself.

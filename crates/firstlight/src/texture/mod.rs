@@ -122,6 +122,10 @@ pub(crate) trait Params {
     /// The share of a texture on which a number is at or above a cutoff. Of a constant 0 or 1.
     fn mask(&mut self, cx: &mut CompileContext, field: &str, param: &NumberParam, cutoff: f64) -> Param<f32>;
 
+    /// The number that a mask is made of, where a mesh may have an alpha at its vertices that multiplies it. Its faults
+    /// are those of the mask.
+    fn unmasked(&mut self, param: &NumberParam) -> Option<Param<f32>>;
+
     /// The normal map called `texture`.
     fn normals(&mut self, cx: &mut CompileContext, field: &str, texture: &str) -> Option<TextureId>;
 }
