@@ -5,11 +5,11 @@
 //! colour and S the sRGB curve. An error e of c changes channel i of the picture by S'(f_i) sum_j |df_i / dc_j| e_j, to
 //! first order. This is bounded by three terms.
 //!
-//! - Its own error: |df_i / dc_i| S'(f_i) is at most T'(c_i), the slope of [`neutral_curve`], whatever the other channels
-//!   are. At the toe f_i is at least 6.25 c_i^2, in the middle c_i - 0.04. Where light is compressed by a factor k, the
-//!   slope is k S'(k c), which is at most S'(c), since x S'(x) never falls.
-//! - The smallest channel: the offset changes by at most t = max(0, 1 - 12.5 m) times the error of m. Channel i has that
-//!   error beside its own.
+//! - Its own error: |df_i / dc_i| S'(f_i) is at most T'(c_i), the slope of [`neutral_curve`], whatever the other
+//!   channels are. At the toe f_i is at least 6.25 c_i^2, in the middle c_i - 0.04. Where light is compressed by a
+//!   factor k, the slope is k S'(k c), which is at most S'(c), since x S'(x) never falls.
+//! - The smallest channel: the offset changes by at most t = max(0, 1 - 12.5 m) times the error of m. Channel i has
+//!   that error beside its own.
 //! - The largest channel: where p is above 0.76, the compression changes by the error of p. The effect on the others is
 //!   at most [`OF_PEAK`] times that error on T; in dark channels of saturated colours, where the curve is steeper,
 //!   [`OF_SATURATED_PEAK`] times.

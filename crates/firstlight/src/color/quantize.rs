@@ -41,8 +41,8 @@ struct Bucket {
 /// The bits of positive infinity: the last that a number can have here.
 const INFINITE: u32 = f32::INFINITY.to_bits();
 
-/// The code, 0 to `largest`, that a linear value has in a picture without tone mapping: what every faster way must agree
-/// with. Halves are rounded up; NaN is 0.
+/// The code, 0 to `largest`, that a linear value has in a picture without tone mapping: what every faster way must
+/// agree with. Halves are rounded up; NaN is 0.
 pub(crate) fn definition(display: &Display, largest: u32, linear: f32) -> u16 {
     (display.encode(linear) * f64::from(largest)).round() as u16
 }

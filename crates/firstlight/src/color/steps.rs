@@ -16,8 +16,8 @@ const ENTRIES: usize = ((LAST - FIRST) as u32 * PER_OCTAVE) as usize + 1;
 /// scene's tolerance. What is judged by it scales with the tolerance. Beyond white it goes on as steep as it is there,
 /// over the value: what a picture cuts off may still be wanted in a file of floats.
 ///
-/// With a tone mapping, which joins the channels, the table is a curve that is at least as steep as the displayed channel
-/// over its own value whatever the other two are, and the effect of the others is added ([`NeutralCoupling`]).
+/// With a tone mapping, which joins the channels, the table is a curve that is at least as steep as the displayed
+/// channel over its own value whatever the other two are, and the effect of the others is added ([`NeutralCoupling`]).
 #[derive(Clone, Debug)]
 pub(crate) struct DisplaySteps {
     encoded: Vec<f32>,

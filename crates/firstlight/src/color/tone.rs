@@ -6,8 +6,8 @@ pub enum ToneMapping {
     /// Nothing: what is above 1 is cut off.
     #[default]
     None,
-    /// The PBR Neutral tone mapper of Khronos: colours of surfaces stay as they are, highlights above 0.8 are compressed
-    /// and turn white. It goes with the sRGB curve.
+    /// The PBR Neutral tone mapper of Khronos: colours of surfaces stay as they are, highlights above 0.8 are
+    /// compressed and turn white. It goes with the sRGB curve.
     Neutral,
 }
 

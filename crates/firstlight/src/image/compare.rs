@@ -194,9 +194,9 @@ impl StoredPlane {
         ["R", "G", "B"].iter().all(|name| self.channels.iter().any(|channel| channel == name))
     }
 
-    /// Its colours as they are displayed, over black: linear Rec. 709 after exposure and tone mapping. Those of 8 and 16
-    /// bits are decoded by the curve of `display`; others are multiplied by its exposure and tone mapped. `None` if it is
-    /// none.
+    /// Its colours as they are displayed, over black: linear Rec. 709 after exposure and tone mapping. Those of 8 and
+    /// 16 bits are decoded by the curve of `display`; others are multiplied by its exposure and tone mapped. `None` if
+    /// it is none.
     pub fn displayed(&self, display: &Display) -> Option<Vec<[f32; 3]>> {
         let pixels = self.rgba()?;
         Some(match self.steps {

@@ -64,14 +64,14 @@ words! {
         Barycentric = "barycentric",
         /// The diffuse colour of its material there, texture and vertex colour looked up; 0 on lights.
         Albedo = "albedo",
-        /// The roughness of its material there, 0 to 1, the root of GGX's alpha; of the kinds with a `shininess` that of
-        /// the same width: (2 / (s + 2))^(1/4), s the exponent of Blinn-Phong or 4 times that of Phong. 1 where there is
-        /// no highlight; 0 on lights.
+        /// The roughness of its material there, 0 to 1, the root of GGX's alpha; of the kinds with a `shininess` that
+        /// of the same width: (2 / (s + 2))^(1/4), s the exponent of Blinn-Phong or 4 times that of Phong. 1 where
+        /// there is no highlight; 0 on lights.
         Roughness = "roughness",
         /// How much of a metal its material is there, 0 to 1; 0 of all kinds but metallic-roughness, and on lights.
         Metallic = "metallic",
-        /// The alpha, 0 to 1, of the first surface there, be it a veil that all other buffers pass through: 1 of what is
-        /// opaque, and of lights.
+        /// The alpha, 0 to 1, of the first surface there, be it a veil that all other buffers pass through: 1 of what
+        /// is opaque, and of lights.
         Opacity = "opacity",
         /// Which object it is, in scene order: 1 for the first shape, and the lights after all shapes. Each instance of
         /// a shape is an object of its own.

@@ -32,8 +32,8 @@ pub struct Alpha {
 }
 
 impl Alpha {
-    /// The part of a camera ray that the surface stops, 0 to 1: of a mask the share of the footprint that is there, where
-    /// vertices have an alpha of their own 0 or 1.
+    /// The part of a camera ray that the surface stops, 0 to 1: of a mask the share of the footprint that is there,
+    /// where vertices have an alpha of their own 0 or 1.
     pub(crate) fn at_surface(&self, si: &SurfaceInteraction, textures: &[Texture]) -> f32 {
         if let Some(product) = self.product(si.uv, si.alpha, textures) {
             return product;

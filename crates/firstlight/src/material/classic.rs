@@ -84,9 +84,9 @@ impl Classic {
         Bsdf { colors, ambient, lobe }
     }
 
-    /// The roughness of a microfacet highlight of the same width: with alpha^2 = 2 / (s + 2) the distributions of GGX and
-    /// of Blinn-Phong of exponent s agree at the peak to second order. Phong's highlight is as wide as Blinn-Phong's of 4
-    /// times the exponent. 1 without a highlight.
+    /// The roughness of a microfacet highlight of the same width: with alpha^2 = 2 / (s + 2) the distributions of GGX
+    /// and of Blinn-Phong of exponent s agree at the peak to second order. Phong's highlight is as wide as
+    /// Blinn-Phong's of 4 times the exponent. 1 without a highlight.
     ///
     /// Source: Walter, Marschner, Li, Torrance, "Microfacet models for refraction", 2007 (the exponent).
     pub(super) fn roughness(&self, si: &SurfaceInteraction, textures: &[Texture]) -> f32 {

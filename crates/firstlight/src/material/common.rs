@@ -17,7 +17,8 @@ table! {
         pub emissive: ColorParam = ColorParam::gray(0.0),
         /// Multiplies `emissive`: 0 to 1e6.
         pub emissive_strength: f64 = 1.0,
-        /// How much of the light behind the surface it stops: 0 to 1. The alpha of the vertices of a mesh multiplies it.
+        /// How much of the light behind the surface it stops: 0 to 1. The alpha of the vertices of a mesh multiplies
+        /// it.
         pub alpha: NumberParam = NumberParam::constant(1.0),
         /// What is made of `alpha`.
         pub alpha_mode: AlphaMode = AlphaMode::Opaque,

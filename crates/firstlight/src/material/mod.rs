@@ -199,8 +199,8 @@ impl Material {
         color.color(si, textures) * si.color
     }
 
-    /// The roughness of its highlight, 0 to 1: that of GGX; of a power of a cosine the one of the same width. 1 without a
-    /// highlight.
+    /// The roughness of its highlight, 0 to 1: that of GGX; of a power of a cosine the one of the same width. 1 without
+    /// a highlight.
     pub(crate) fn roughness(&self, si: &SurfaceInteraction, textures: &[Texture]) -> f32 {
         match &self.reflection {
             Reflection::Classic(classic) => classic.roughness(si, textures),
