@@ -11,6 +11,7 @@ mod highlight;
 mod lobe_lanes;
 mod metallic_roughness;
 mod moments;
+mod normal_mapping;
 mod phong;
 mod shading_point;
 mod unlit;
@@ -28,6 +29,7 @@ pub(crate) use highlight::Highlight;
 pub(crate) use lobe_lanes::LobeLanes;
 pub use metallic_roughness::{MetallicRoughness, MetallicRoughnessDesc};
 pub(crate) use moments::{Colors, LightTerm, MOMENTS, Moments, PARTS, PerMoment};
+pub use normal_mapping::{NormalFix, NormalMapping};
 pub use phong::{PhongDesc, PhongLobe};
 pub(crate) use shading_point::ShadingPoint;
 pub use unlit::UnlitDesc;
@@ -97,7 +99,8 @@ impl Material {
     pub fn bsdf(&self, si: &SurfaceInteraction, textures: &[Texture], ambient: &Ambient) -> Bsdf {
         let ambient = self.varies_with_view(ambient).then_some((ambient, ViewGeometry { ns: si.ns, wo: si.wo }));
         let color = |param: &Param<Rgb>| param.color(si, textures) * si.color;
-        self.evaluate(color, |param| param.number(si, textures, 1.0), ambient)
+        // Data is filtered over the pixel's footprint, so that a lobe hardly varies within a pixel
+        self.evaluate(color, |param| param.number(si, textures, si.footprints_per_pixel), ambient)
     }
 
     /// The same on any surface, if it is the same on all.
@@ -135,6 +138,15 @@ impl Material {
         }
     }
 
+    /// Whether it may have a highlight.
+    pub(crate) fn has_lobe(&self) -> bool {
+        match &self.reflection {
+            Reflection::Classic(classic) => !classic.specular.factor.is_black(),
+            Reflection::MetallicRoughness(_) => true,
+            Reflection::Unlit(_) => false,
+        }
+    }
+
     /// Whether it may emit light.
     pub(crate) fn is_emissive(&self) -> bool {
         matches!(self.reflection, Reflection::Unlit(_)) || !self.common.emissive.factor.is_black()
@@ -166,7 +178,7 @@ impl Material {
 
     /// The textures of its parameters, those of its common ones first.
     fn textures(&self) -> impl Iterator<Item = Option<TextureId>> {
-        let mut all = ArrayVec::<_, 8>::from_iter(self.common.textures());
+        let mut all = ArrayVec::<_, 9>::from_iter(self.common.textures());
         match &self.reflection {
             Reflection::Classic(classic) => all.extend(classic.textures()),
             Reflection::MetallicRoughness(material) => all.extend(material.textures()),

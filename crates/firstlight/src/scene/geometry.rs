@@ -112,6 +112,8 @@ pub(crate) struct MaterialRules {
     layered: Vec<bool>,
     /// For each material whether camera rays pass through from behind; empty if they do through none.
     single_sided: Vec<bool>,
+    /// For each material whether it bends shading normals; empty if none does.
+    mapped: Vec<bool>,
 }
 
 impl MaterialRules {
@@ -123,7 +125,19 @@ impl MaterialRules {
         MaterialRules {
             layered: each(|material| material.common.alpha.is_some()),
             single_sided: each(|material| material.common.single_sided),
+            mapped: each(|material| material.common.normals.is_some()),
         }
+    }
+
+    /// Whether a material bends shading normals.
+    #[inline(always)]
+    pub fn is_mapped(&self, material: MaterialId) -> bool {
+        self.mapped.get(material.index()).is_some_and(|is| *is)
+    }
+
+    /// Whether any material does.
+    pub fn has_maps(&self) -> bool {
+        !self.mapped.is_empty()
     }
 
     /// Whether surfaces of a material are layers.

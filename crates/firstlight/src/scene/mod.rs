@@ -14,6 +14,7 @@ mod light_spheres;
 mod links;
 mod model;
 mod motion;
+mod normals;
 mod occluders;
 mod outline;
 mod place;

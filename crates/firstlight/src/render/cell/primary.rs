@@ -152,6 +152,8 @@ impl CellRenderer<'_> {
                 pixel.terms.emission.add(scene.lights[light].radiance, left.into());
                 continue;
             }
+            // A shape has one normal at each point, without maps
+            let shape = shape.filter(|_| !scene.geometry.is_mapped(&hit));
             let point = match shape {
                 Some(shape) => {
                     let bsdf = self.fragments.plain_bsdf(scene, shape).unwrap_or_else(|| {
