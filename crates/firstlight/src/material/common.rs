@@ -38,6 +38,9 @@ table! {
         pub bump_scale: f64 = 1.0,
         /// What is made of mapped normals that face away from the viewer, or mirror the viewer below the surface.
         pub normal_fix: NormalFix = NormalFix::Raise,
+        /// Whether highlights are widened by as much as normals vary within a pixel: those of a normal map, and of what
+        /// curves under metallic-roughness. Without it small highlights flicker from frame to frame.
+        pub specular_antialiasing: bool = true,
     }
 }
 
@@ -54,6 +57,8 @@ pub struct MaterialCommon {
     pub normals: Option<NormalMapping>,
     /// What is made of bent normals that face away.
     pub normal_fix: NormalFix,
+    /// Whether highlights are widened by as much as normals vary within a pixel.
+    pub specular_antialiasing: bool,
 }
 
 impl MaterialCommonDesc {
@@ -64,8 +69,8 @@ impl MaterialCommonDesc {
         let alpha = self.compile_alpha(cx, params);
         let map = (self.normal_map.as_deref(), self.normal_scale);
         let normals = NormalMapping::compile(cx, params, map, (&self.bump_map, self.bump_scale));
-        let normal_fix = self.normal_fix;
-        MaterialCommon { emissive, alpha, single_sided: self.single_sided, normals, normal_fix }
+        let MaterialCommonDesc { single_sided, normal_fix, specular_antialiasing, .. } = *self;
+        MaterialCommon { emissive, alpha, single_sided, normals, normal_fix, specular_antialiasing }
     }
 
     fn compile_alpha(&self, cx: &mut CompileContext, params: &mut impl Params) -> Option<Alpha> {
@@ -100,6 +105,7 @@ impl MaterialCommon {
             single_sided: false,
             normals: None,
             normal_fix: NormalFix::Raise,
+            specular_antialiasing: true,
         }
     }
 

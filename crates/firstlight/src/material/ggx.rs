@@ -24,6 +24,9 @@ pub struct GgxLobe {
 
 /// The least alpha. A narrower highlight is a mirror image.
 const MIN_ALPHA: f32 = 0.003;
+/// A part of alpha^2: what other normals in a pixel may add to it without effect, so that the highlight is one all over a
+/// surface that is large in the picture. A peak is at most as much too bright: a display step of the brightest.
+const UNSEEN: f32 = 0.01;
 /// The least cosine to the viewer: smooth normals of facets may be turned away.
 const MIN_COS: f32 = 1e-4;
 /// The least square of the length of wi + wo: opposite directions have no half vector.
@@ -41,6 +44,22 @@ impl GgxLobe {
     /// `roughness` and `grazing` from 0 to 1.
     pub(super) fn new(roughness: f32, grazing: f32) -> Self {
         GgxLobe { alpha: (roughness * roughness).max(MIN_ALPHA), grazing }
+    }
+
+    /// Whether such a variance of the slopes of normals leaves it as it is.
+    pub(super) fn ignores(&self, slope_variance: f32) -> bool {
+        2.0 * slope_variance <= self.alpha * self.alpha * UNSEEN
+    }
+
+    /// The same where the slopes of normals vary as much within a pixel: alpha^2 is twice the variance of slopes.
+    #[inline(always)]
+    pub(super) fn widened(self, slope_variance: f32) -> Self {
+        if self.ignores(slope_variance) {
+            return self;
+        }
+        // Less what is ignored: it begins without a step
+        let alpha2 = self.alpha * self.alpha;
+        GgxLobe { alpha: (alpha2 + (2.0 * slope_variance - alpha2 * UNSEEN)).min(1.0).sqrt(), ..self }
     }
 
     /// The transmitted cosine, the f0 part and the f90 part, from the cosines n.wi > 0, n.wo and wi.wo. Never negative,

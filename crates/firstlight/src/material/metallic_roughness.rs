@@ -50,7 +50,7 @@ table! {
 pub struct MetallicRoughness {
     pub(super) base_color: Param<Rgb>,
     metallic: Param<f32>,
-    roughness: Param<f32>,
+    pub(super) roughness: Param<f32>,
     /// The reflectance of dielectrics seen from the front, before `specular_color`.
     f0: f32,
     specular: Param<f32>,
@@ -90,6 +90,7 @@ impl MetallicRoughness {
         color: impl Fn(&Param<Rgb>) -> Rgb,
         number: impl Fn(&Param<f32>) -> f32,
         ambient: Option<(&Ambient, ViewGeometry)>,
+        slope_variance: f32,
     ) -> Bsdf {
         let unit = |param: &Param<f32>| number(param).clamp(0.0, 1.0);
         let (base_color, metallic, specular) = (color(&self.base_color), unit(&self.metallic), unit(&self.specular));
@@ -98,13 +99,18 @@ impl MetallicRoughness {
         let colors = self.colors(base_color, metallic, specular, dielectric);
         // The base receives 1 - max F = (1 - max f0) (1 - grazing w)
         let grazing = if strongest < 1.0 { (specular - strongest) / (1.0 - strongest) } else { 0.0 };
-        let lobe = GgxLobe::new(unit(&self.roughness), grazing.clamp(0.0, 1.0));
+        let lobe = GgxLobe::new(unit(&self.roughness), grazing.clamp(0.0, 1.0)).widened(slope_variance);
         let ambient = ambient.map_or(Rgb::BLACK, |(ambient, view)| {
             let [diffuse, f0, f90] = colors.0;
             let [near, grazing] = lobe.white_albedo(view.cos_o());
             ambient.answer(&view, diffuse, f0 * near + f90 * grazing) * unit(&self.occlusion)
         });
         Bsdf { colors, ambient, lobe: Lobe::Ggx(lobe) }
+    }
+
+    /// Whether its highlight is the same where the slopes of normals vary by no more than this.
+    pub(super) fn ignores(&self, slope_variance: f32) -> bool {
+        self.roughness.texture.is_none() && GgxLobe::new(self.roughness.factor, 0.0).ignores(slope_variance)
     }
 
     /// What the base, f0 and f90 are worth.

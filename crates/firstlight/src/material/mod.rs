@@ -20,8 +20,8 @@ pub use alpha::{Alpha, AlphaMode};
 pub(crate) use ambient::ViewGeometry;
 pub use ambient::{Ambient, AmbientDesc, AmbientGradientDesc};
 pub use blinn_phong::{BlinnPhongDesc, BlinnPhongLobe};
-pub(crate) use bsdf::LOBE_NUMBERS;
 pub use bsdf::{Bsdf, Lobe, LobeKind};
+pub(crate) use bsdf::{LOBE_NUMBERS, MeanLobe};
 pub use classic::Classic;
 pub use common::{MaterialCommon, MaterialCommonDesc};
 pub use ggx::GgxLobe;
@@ -100,27 +100,29 @@ impl Material {
         let ambient = self.varies_with_view(ambient).then_some((ambient, ViewGeometry { ns: si.ns, wo: si.wo }));
         let color = |param: &Param<Rgb>| param.color(si, textures) * si.color;
         // Data is filtered over the pixel's footprint, so that a lobe hardly varies within a pixel
-        self.evaluate(color, |param| param.number(si, textures, si.footprints_per_pixel), ambient)
+        let number = |param: &Param<f32>| param.number(si, textures, si.footprints_per_pixel);
+        self.evaluate(color, number, ambient, si.slope_variance)
     }
 
     /// The same on any surface, if it is the same on all.
     pub(crate) fn plain_bsdf(&self, ambient: &Ambient) -> Option<Bsdf> {
         let is_plain = self.may_be_even(ambient) && self.textures().all(|texture| texture.is_none());
-        is_plain.then(|| self.evaluate(|param| param.factor, |param| param.factor, None))
+        is_plain.then(|| self.evaluate(|param| param.factor, |param| param.factor, None, 0.0))
     }
 
     /// The material in numbers, from the values of its parameters. `ambient`: the light to which the answer varies with
-    /// the directions at the surface, if it does.
+    /// the directions at the surface, if it does. `slope_variance`: see [`SurfaceInteraction`].
     #[inline(always)]
     fn evaluate(
         &self,
         color: impl Fn(&Param<Rgb>) -> Rgb,
         number: impl Fn(&Param<f32>) -> f32,
         ambient: Option<(&Ambient, ViewGeometry)>,
+        slope_variance: f32,
     ) -> Bsdf {
         match &self.reflection {
-            Reflection::Classic(classic) => classic.evaluate(color, number, ambient),
-            Reflection::MetallicRoughness(material) => material.evaluate(color, number, ambient),
+            Reflection::Classic(classic) => classic.evaluate(color, number, ambient, slope_variance),
+            Reflection::MetallicRoughness(material) => material.evaluate(color, number, ambient, slope_variance),
             Reflection::Unlit(_) => unlit::UNLIT,
         }
     }
@@ -135,6 +137,40 @@ impl Material {
         match &self.reflection {
             Reflection::Unlit(radiance) => radiance.color(si, textures) * si.color + emissive,
             _ => emissive,
+        }
+    }
+
+    /// Whether shading normals are bent by its maps, raised, or filtered.
+    pub(crate) fn refines_normals(&self) -> bool {
+        let common = &self.common;
+        let is_filtered = || common.specular_antialiasing || common.normal_fix == NormalFix::Raise;
+        common.normals.is_some() || matches!(self.reflection, Reflection::MetallicRoughness(_)) && is_filtered()
+    }
+
+    /// Whether its highlight is the same where the slopes of normals vary by no more than this.
+    pub(crate) fn ignores(&self, slope_variance: f32) -> bool {
+        match &self.reflection {
+            Reflection::MetallicRoughness(material) => material.ignores(slope_variance),
+            // Filtered under maps only
+            Reflection::Classic(_) | Reflection::Unlit(_) => self.common.normals.is_none(),
+        }
+    }
+
+    /// Whether the width of its highlight is that of a texture.
+    pub(crate) fn has_lobe_texture(&self) -> bool {
+        match &self.reflection {
+            Reflection::Classic(classic) => classic.shininess.texture.is_some(),
+            Reflection::MetallicRoughness(material) => material.roughness.texture.is_some(),
+            Reflection::Unlit(_) => false,
+        }
+    }
+
+    /// Whether textures drive numbers of it.
+    pub(crate) fn has_data(&self) -> bool {
+        match &self.reflection {
+            Reflection::Classic(classic) => classic.shininess.texture.is_some(),
+            Reflection::MetallicRoughness(material) => material.textures()[2..].iter().any(Option::is_some),
+            Reflection::Unlit(_) => false,
         }
     }
 

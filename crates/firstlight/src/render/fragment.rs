@@ -104,15 +104,16 @@ impl Fragments {
         self.parts.clear();
     }
 
-    /// The material of a shape, if that has no textures.
+    /// The material of a shape, if that has no textures, and no highlight that its curvature changes.
     pub fn plain_bsdf(&self, scene: &Scene, shape: VisibleShape) -> Option<Bsdf> {
         if let VisibleShape::Facet(facet) = shape
             && scene.geometry.has_colors(facet)
         {
             return None;
         }
-        let surface = scene.geometry.surfaces.get(shape.surface(scene).index())?;
-        self.plain[surface.material?.index()]
+        let material = scene.geometry.surfaces.get(shape.surface(scene).index())?.material?;
+        let is_filtered = matches!(shape, VisibleShape::Sphere(_)) && scene.geometry.rules.refines(material);
+        self.plain[material.index()].filter(|_| !is_filtered)
     }
 
     /// The shading points of a rate.
@@ -273,7 +274,7 @@ impl Fragments {
     fn add_quadrants(&mut self, scene: &Scene, fragment: usize, pixel: [u32; 2]) -> Option<()> {
         let Fragment { shape, mean, ref rays, share, .. } = self.all[fragment];
         let rays = rays.clone();
-        if mean.lobes_differ || rays.len() <= FEW_RAYS {
+        if rays.len() <= FEW_RAYS {
             return None;
         }
         let half = scene.antialiasing.div_ceil(2) as u16;
@@ -287,6 +288,9 @@ impl Fragments {
                 true => mean,
                 false => MeanBsdf::of(own.clone().map(|ray| self.rays[ray].bsdf))?,
             };
+            if mean.lobes_differ {
+                return None;
+            }
             let point = self.center(scene, pixel, shape, &mean.bsdf, own)?;
             let closed_form_budget = count as f32 / rays.len() as f32;
             self.points.push(ShadingPoint { share, most_motion: TOLERANCE.motion, closed_form_budget, ..point });

@@ -114,6 +114,8 @@ pub(crate) struct MaterialRules {
     single_sided: Vec<bool>,
     /// For each material whether it bends shading normals; empty if none does.
     mapped: Vec<bool>,
+    /// For each material whether its shading normals are bent, raised, or filtered; empty if those of none are.
+    refined: Vec<bool>,
 }
 
 impl MaterialRules {
@@ -126,6 +128,7 @@ impl MaterialRules {
             layered: each(|material| material.common.alpha.is_some()),
             single_sided: each(|material| material.common.single_sided),
             mapped: each(|material| material.common.normals.is_some()),
+            refined: each(Material::refines_normals),
         }
     }
 
@@ -135,7 +138,18 @@ impl MaterialRules {
         self.mapped.get(material.index()).is_some_and(|is| *is)
     }
 
-    /// Whether any material does.
+    /// Whether shading normals of surfaces of a material are bent, raised, or filtered.
+    #[inline(always)]
+    pub fn refines(&self, material: MaterialId) -> bool {
+        self.refined.get(material.index()).is_some_and(|is| *is)
+    }
+
+    /// The same of any material.
+    pub fn refines_any(&self) -> bool {
+        !self.refined.is_empty()
+    }
+
+    /// Whether any material bends shading normals.
     pub fn has_maps(&self) -> bool {
         !self.mapped.is_empty()
     }

@@ -1,31 +1,67 @@
 //! Shading normals that maps bend, and what is made of those that face away from the viewer.
 
 use super::Scene;
-use super::geometry::Hit;
+use super::geometry::{At, Geometry, Hit, Placed, PlacedSpot, PlacedTarget, Surface};
+use crate::ids::SurfaceId;
 use crate::material::NormalFix;
 use crate::math::{Ray, Vec3};
-use crate::shape::SurfaceInteraction;
+use crate::shape::{NormalFrame, RayDifferential, SolidHit, SurfaceInteraction};
 
 /// The least cosine between a bent normal and the direction to the viewer, and of the mirrored direction above the
 /// surface: below it a highlight at grazing angles is brighter than what is around it.
 const LEAST_COS: f32 = 0.01;
 
+/// The variance of a pixel's filter, in pixels^2: a Gaussian of 1 / sqrt(2 pi).
+const PIXEL_VARIANCE: f32 = 0.159_154_94;
+/// The largest variance of slopes by curvature: wider than that no highlight is, however small the thing.
+const MOST_CURVED: f32 = 0.09;
+
 impl Scene {
-    /// Bends the shading normal of a surface, seen from one side, by the maps of its material. `front` is the shading
-    /// normal of the front.
+    /// Whether anything of a surface depends on the footprints of rays: textures, and filtered normals.
+    pub(crate) fn needs_differentials(&self) -> bool {
+        !self.textures.is_empty() || self.geometry.rules.refines_any()
+    }
+
+    /// Bends the shading normal of a surface, seen from one side, by the maps of its material, and finds how much the
+    /// normals vary within the pixel. `front` is the shading normal of the front.
     #[inline(never)]
-    pub(super) fn bend_normal(&self, si: &mut SurfaceInteraction, ray: &Ray, hit: &Hit, front: Vec3) {
+    pub(super) fn refine_normal(
+        &self,
+        si: &mut SurfaceInteraction,
+        ray: &Ray,
+        hit: &Hit,
+        front: Vec3,
+        differential: &RayDifferential,
+    ) {
         let material = &self.materials[si.material.index()];
-        let Some(maps) = &material.common.normals else { return };
-        let Some(frame) = self.geometry.normal_frame(ray, hit, front) else { return };
-        let Some((bent, slope_variance)) = maps.bent(si, &frame, &self.textures) else { return };
-        // Turned together with the shading normal
-        let is_back = si.ns.dot(front) < 0.0;
-        si.ns = if is_back { -bent } else { bent };
-        si.slope_variance = slope_variance;
-        if material.common.normal_fix == NormalFix::Raise {
-            si.ns = raised(si.ng, si.wo, si.ns, material.has_lobe());
+        let filters = material.common.specular_antialiasing;
+        if filters {
+            si.slope_variance = self.curved(ray, hit, differential);
         }
+        if let Some(maps) = &material.common.normals
+            && let Some(frame) = self.geometry.normal_frame(ray, hit, front)
+            && let Some((bent, slope_variance)) = maps.bent(si, &frame, &self.textures)
+        {
+            // Turned together with the shading normal
+            let is_back = si.ns.dot(front) < 0.0;
+            si.ns = if is_back { -bent } else { bent };
+            si.slope_variance += if filters { slope_variance } else { 0.0 };
+        }
+        if material.common.normal_fix == NormalFix::Raise && si.ns != si.ng {
+            let is_mapped = material.common.normals.is_some();
+            si.ns = raised(si.ng, si.wo, si.ns, is_mapped && material.has_lobe());
+        }
+    }
+
+    /// The variance of slopes within a pixel that the curvature of a shape makes.
+    ///
+    /// Half of min(2 sigma^2 (|dn/dx|^2 + |dn/dy|^2), 0.18), sigma^2 = 1 / (2 pi): Tokuyoshi, Kaplanyan, "Improved
+    /// geometric specular antialiasing", I3D 2019. alpha^2 is twice the variance of slopes.
+    fn curved(&self, ray: &Ray, hit: &Hit, differential: &RayDifferential) -> f32 {
+        let Some(pixel) = differential.of_pixel() else { return 0.0 };
+        let [dx, dy] = self.geometry.normal_steps(ray, hit, &pixel);
+        let squared = dx.length_squared() + dy.length_squared();
+        if squared.is_finite() { (PIXEL_VARIANCE * squared).min(MOST_CURVED) } else { MOST_CURVED }
     }
 }
 
@@ -66,4 +102,65 @@ fn raised(ng: Vec3, wo: Vec3, ns: Vec3, has_lobe: bool) -> Vec3 {
     let squared = 0.25 * (if x < 0.0 { b + root } else { b - root }) / a;
     let squared = if squared > 0.0 { squared.min(1.0) } else { return ng };
     along * (1.0 - squared).sqrt() + ng * squared.sqrt()
+}
+
+impl Geometry {
+    /// What a normal map counts from at a hit of a shape whose front normal there is `n`. `None` where u has no
+    /// direction.
+    pub fn normal_frame(&self, ray: &Ray, hit: &Hit, n: Vec3) -> Option<NormalFrame> {
+        match hit.at {
+            At::World(point) => self.world.as_ref()?.mesh.normal_frame(None, point),
+            At::Placed(index, PlacedSpot::Triangle(point)) => {
+                let Placed { placement, target, .. } = &self.placed[index as usize];
+                let PlacedTarget::Mesh(mesh) = *target else { unreachable!("only meshes have triangles") };
+                self.meshes[mesh as usize].normal_frame(Some(placement), point)
+            }
+            _ => NormalFrame::new(n.as_dvec3(), self.tangents(ray, hit)),
+        }
+    }
+
+    /// Whether the material at a hit bends the shading normal.
+    #[inline(always)]
+    pub fn is_mapped(&self, hit: &Hit) -> bool {
+        self.rules.has_maps() && {
+            let surface = self.surfaces.get(hit.surface.index());
+            surface.is_some_and(|surface| {
+                self.rules.is_mapped(surface.material.unwrap_or_else(|| self.face_material(hit)))
+            })
+        }
+    }
+
+    /// Whether a material of a surface may bend the shading normal.
+    pub fn may_be_mapped(&self, surface: SurfaceId) -> bool {
+        let may = |surface: &Surface| surface.material.is_none_or(|material| self.rules.is_mapped(material));
+        self.rules.has_maps() && self.surfaces.get(surface.index()).is_some_and(may)
+    }
+
+    /// How the unit shading normal of the front changes from a hit of a shape with each step.
+    fn normal_steps(&self, ray: &Ray, hit: &Hit, differential: &RayDifferential) -> [Vec3; 2] {
+        match hit.at {
+            At::Sphere(i) => self.spheres[i as usize].shape.normal_steps(ray, hit.t, differential),
+            At::Parallelogram(_) | At::Light => [Vec3::ZERO; 2],
+            At::World(point) => {
+                let world = self.world.as_ref().expect("the hit is on it");
+                world.mesh.normal_steps(None, point, ray, hit.t, differential)
+            }
+            At::Placed(index, spot) => {
+                let Placed { placement, target, .. } = &self.placed[index as usize];
+                match (*target, spot) {
+                    (PlacedTarget::Mesh(mesh), PlacedSpot::Triangle(point)) => {
+                        self.meshes[mesh as usize].normal_steps(Some(placement), point, ray, hit.t, differential)
+                    }
+                    (PlacedTarget::Points(points), PlacedSpot::Point(point)) => {
+                        self.point_sets[points as usize].normal_steps(placement, point, ray, hit.t, differential)
+                    }
+                    (PlacedTarget::Solid(solid), PlacedSpot::Part(part)) => {
+                        let hit = SolidHit { t: hit.t, part };
+                        placement.solid_normal_steps(&self.solids[solid as usize], &hit, ray, differential)
+                    }
+                    _ => unreachable!("a spot is on the kind of thing that was hit"),
+                }
+            }
+        }
+    }
 }

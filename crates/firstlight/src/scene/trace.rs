@@ -203,8 +203,8 @@ impl Scene {
             material,
             receives_shadow,
         };
-        if self.geometry.rules.is_mapped(material) {
-            self.bend_normal(&mut si, ray, hit, shading);
+        if self.geometry.rules.refines(material) {
+            self.refine_normal(&mut si, ray, hit, shading, differential);
         }
         si
     }

@@ -3,14 +3,14 @@
 use arrayvec::ArrayVec;
 use fearless_simd::{Level, prelude::*};
 
-use super::geometry::{At, Geometry, Hit, Nearest, Placed, PlacedSpot, PlacedTarget, Surface, UpperItem};
+use super::geometry::{At, Geometry, Hit, Nearest, Placed, PlacedSpot, PlacedTarget, UpperItem};
 use super::occluders::Opacity;
 use crate::accel::{Aabb, Planes, RayTile, TraceRay, dispatch_eight};
 use crate::ids::{MaterialId, SurfaceId};
 use crate::math::{DVec3, Facet, Ray, Vec3};
 use crate::shape::{
-    JoinedPart, Mesh, NormalFrame, Parallelogram, Placement, RayDifferential, ShadowTerminator, ShapePoint, SolidHit,
-    TileHits, TrianglePoint, every,
+    JoinedPart, Mesh, Parallelogram, Placement, RayDifferential, ShadowTerminator, ShapePoint, SolidHit, TileHits,
+    TrianglePoint, every,
 };
 
 /// So many meshes at the same place are asked for many rays at once, each for all of them.
@@ -470,37 +470,6 @@ impl Geometry {
             }
             At::Light => panic!("a light has no texture coordinates"),
         }
-    }
-
-    /// What a normal map counts from at a hit of a shape whose front normal there is `n`. `None` where u has no
-    /// direction.
-    pub fn normal_frame(&self, ray: &Ray, hit: &Hit, n: Vec3) -> Option<NormalFrame> {
-        match hit.at {
-            At::World(point) => self.world.as_ref()?.mesh.normal_frame(None, point),
-            At::Placed(index, PlacedSpot::Triangle(point)) => {
-                let Placed { placement, target, .. } = &self.placed[index as usize];
-                let PlacedTarget::Mesh(mesh) = *target else { unreachable!("only meshes have triangles") };
-                self.meshes[mesh as usize].normal_frame(Some(placement), point)
-            }
-            _ => NormalFrame::new(n.as_dvec3(), self.tangents(ray, hit)),
-        }
-    }
-
-    /// Whether the material at a hit bends the shading normal.
-    #[inline(always)]
-    pub fn is_mapped(&self, hit: &Hit) -> bool {
-        self.rules.has_maps() && {
-            let surface = self.surfaces.get(hit.surface.index());
-            surface.is_some_and(|surface| {
-                self.rules.is_mapped(surface.material.unwrap_or_else(|| self.face_material(hit)))
-            })
-        }
-    }
-
-    /// Whether a material of a surface may bend the shading normal.
-    pub fn may_be_mapped(&self, surface: SurfaceId) -> bool {
-        let may = |surface: &Surface| surface.material.is_none_or(|material| self.rules.is_mapped(material));
-        self.rules.has_maps() && self.surfaces.get(surface.index()).is_some_and(may)
     }
 
     /// The triangle that was hit, of which of the meshes that were joined.

@@ -169,6 +169,14 @@ impl RayDifferential {
         [self.dx, self.dy, self.origin_dx, self.origin_dy] == [Vec3::ZERO; 4]
     }
 
+    /// The steps from one pixel to the next; `None` without a pixel.
+    pub(crate) fn of_pixel(&self) -> Option<RayDifferential> {
+        let RayDifferential { dx, dy, origin_dx, origin_dy, steps_per_pixel: n } = *self;
+        let is_known = n > 0.0 && !self.is_zero();
+        let [dx, dy, origin_dx, origin_dy] = [dx * n, dy * n, origin_dx * n, origin_dy * n];
+        is_known.then_some(RayDifferential { dx, dy, origin_dx, origin_dy, steps_per_pixel: 1.0 })
+    }
+
     /// The steps, on the plane through the hit with normal `n`, from the point `t d` to where the neighbours meet it:
     /// dp = dO + t dD - d (n.(dO + t dD)) / (n.d).
     ///

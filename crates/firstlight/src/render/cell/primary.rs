@@ -7,6 +7,7 @@ use super::{CellRenderer, Pixel, PixelState};
 use crate::film::hits::camera_ray;
 use crate::film::resolve::PixelTerms;
 use crate::film::tile::Tile;
+use crate::integrate::TOLERANCE;
 use crate::material::{LightTerm, ShadingPoint};
 use crate::math::Ray;
 use crate::render::fragment::RayPoint;
@@ -124,10 +125,9 @@ impl CellRenderer<'_> {
         rays.extend_from_slice(self.pixel_rays.of(scene, [i, j]));
         for (k, ray) in (0..).zip(&rays) {
             let at = [k % n, k / n].map(|at| at as u16);
-            // Only textures need differentials
-            let differential = || match scene.textures.is_empty() {
-                true => RayDifferential::default(),
-                false => camera_ray(scene, i * n + k % n, j * n + k / n).1,
+            let differential = || match scene.needs_differentials() {
+                false => RayDifferential::default(),
+                true => camera_ray(scene, i * n + k % n, j * n + k / n).1,
             };
             let end = seen(self, at, ray);
             let mut left = 1.0;
@@ -186,6 +186,11 @@ impl CellRenderer<'_> {
             self.blocks.push(SurfaceBlock { square, shape, bsdf, layer: 0, means: None });
             return;
         }
+        let material = scene.geometry.surfaces[shape.surface(scene).index()].material;
+        if material.is_some_and(|material| scene.materials[material.index()].has_lobe_texture()) {
+            // Each pixel has a lobe of its own
+            return self.mark(square, PixelState::Only(shape));
+        }
         if square.side > TEXTURED {
             for quarter in square.quarters_on([scene.width, scene.height]) {
                 self.add_blocks(quarter, shape);
@@ -199,7 +204,7 @@ impl CellRenderer<'_> {
         let start = self.blocks.len();
         for (at, mean) in means {
             let MeanBsdf { bsdf, .. } = mean;
-            let is_alike = |block: &SurfaceBlock| block.bsdf.lobe.with(bsdf.lobe).is_some();
+            let is_alike = |block: &SurfaceBlock| block.bsdf.lobe.is_near(bsdf.lobe, TOLERANCE.block_lobe);
             let layer = self.blocks[start..].iter().position(is_alike).unwrap_or_else(|| {
                 let first = self.means.len();
                 self.means.resize(first + (square.side * square.side) as usize, None);

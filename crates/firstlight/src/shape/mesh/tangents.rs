@@ -6,9 +6,9 @@
 use bevy_mikktspace::{Geometry, Ops, TangentSpace, generate_tangents};
 
 use super::surface::{Mesh, TrianglePoint, blended};
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, Ray, Vec3};
 use crate::shape::placement::Placement;
-use crate::shape::surface::NormalFrame;
+use crate::shape::surface::{NormalFrame, RayDifferential};
 
 /// The tangent of each corner of a triangle: x, y, z, unit, and the sign of the direction of v, which is that times
 /// normal x tangent.
@@ -99,6 +99,37 @@ impl Mesh {
         let part = self.part(at.triangle);
         let stored = part.tangents.get((at.triangle - part.first_triangle) as usize);
         self.stored_frame(placement, at, stored, front, dp).or_else(|| NormalFrame::new(front, dp))
+    }
+
+    /// How the unit normal changes from a point that `ray` met at `t` with each step: as it does within the triangle.
+    pub fn normal_steps(
+        &self,
+        placement: Option<&Placement>,
+        at: TrianglePoint,
+        ray: &Ray,
+        t: f64,
+        differential: &RayDifferential,
+    ) -> [Vec3; 2] {
+        let (normal, of_corners) = self.normals(placement, at);
+        let Some(shading) = of_corners else { return [Vec3::ZERO; 2] };
+        let [a, b, c] = self.corners(at.triangle);
+        let to_world = |e: DVec3| placement.map_or(e, |at| at.world_from_object.transform_vector3(e));
+        let (w1, w2) = (to_world(b - a), to_world(c - a));
+        // The dual basis of the edges: steps on the surface as steps of the weights
+        let cross = w1.cross(w2);
+        let area2 = cross.length_squared();
+        let (u_axis, v_axis) = (w2.cross(cross) / area2, cross.cross(w1) / area2);
+        let corners = self.triangles[at.triangle as usize].map(|i| {
+            let n = Vec3::from(self.normals[i as usize]).as_dvec3();
+            placement.map_or(n, |at| at.normal(n))
+        });
+        let blend = blended(corners, at);
+        differential.on_plane(ray.d, t as f32, normal.as_vec3(), f32::MAX.sqrt() * 0.5).map(|dp| {
+            let (du, dv) = (dp.as_dvec3().dot(u_axis), dp.as_dvec3().dot(v_axis));
+            let moved = blend + (corners[1] - corners[0]) * du + (corners[2] - corners[0]) * dv;
+            let moved = moved.normalize_or_zero();
+            if moved.is_finite() && moved != DVec3::ZERO { (moved - shading).as_vec3() } else { Vec3::ZERO }
+        })
     }
 
     fn stored_frame(
