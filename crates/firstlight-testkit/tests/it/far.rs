@@ -126,7 +126,7 @@ fn a_detailed_model_is_the_same_wherever_it_is() {
 
 #[test]
 fn rays_and_answers_are_in_the_coordinates_of_the_world() {
-    let still = RayDifferential { dx: Vec3::ZERO, dy: Vec3::ZERO, origin_dx: Vec3::ZERO, origin_dy: Vec3::ZERO };
+    let still = RayDifferential::default();
     let here = compiled(&scene([0.0; 3], false));
     for at in PLACES {
         let there = compiled(&scene(at, true));

@@ -22,6 +22,7 @@ mod masks;
 mod meshes;
 mod motion;
 mod near;
+mod normals;
 mod proved;
 mod relight;
 mod robust;

@@ -50,6 +50,8 @@ pub(crate) struct Tolerance {
     pub motion: f32,
     /// In radians or widths of a highlight: the change of direction over a fragment whose middle stands for all of it.
     pub middle_turn: f32,
+    /// The same of microfacets, whose second derivative is known everywhere: beyond an eighth of a width it changes.
+    pub middle_turn_ggx: f32,
     /// In display steps: the second-order change from a middle to its farthest ray, and from that of a quadrant. The
     /// mean over the rays of a quadrant is off by far less: signs differ. Runs: of the first, rms 0.104 and 0.104, time
     /// 1.02 and 1.00; of the second, the same rms, time 1.04 and 0.96 on config 11.
@@ -63,8 +65,8 @@ pub(crate) struct Tolerance {
     /// A part of the colour: the deviation from their mean of colours that are replaced by it.
     pub same_mean: f32,
     /// A part of the width of a lobe: the deviation from their mean of widths that are replaced by it. A peak falls as
-    /// the square of its width, so the mean of peaks is off by three times the square of that, 0.004 of a highlight:
-    /// 0.4 display steps of the brightest.
+    /// the square of its width, so where widths vary evenly over a pixel the mean of peaks is off by half the square of
+    /// that, 0.003 of a highlight: 0.3 display steps of the brightest.
     pub same_lobe: f32,
     /// The same of the pixels of a block, each in place of a pixel of another width: a peak is off by twice that, by
     /// half a display step if it is the brightest.
@@ -136,12 +138,13 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     spread: 5.0,
     motion: 0.3,
     middle_turn: 0.06,
+    middle_turn_ggx: 0.24,
     middle_bend: 0.1,
     quadrant_bend: 3.0,
     color_light_covariance: 0.4,
     even: 0.01,
     same_mean: 0.004,
-    same_lobe: 0.036,
+    same_lobe: 0.08,
     block_lobe: 0.002,
     half_of_rays: 16.0,
     first_points: 256.0,

@@ -165,6 +165,17 @@ impl Material {
         }
     }
 
+    /// Whether all that varies over a surface are numbers, and the width of its highlight may be one of them.
+    pub(crate) fn varies_by_data(&self) -> bool {
+        let has_colors = match &self.reflection {
+            Reflection::Classic(classic) => classic.textures()[..3].iter().any(Option::is_some),
+            Reflection::MetallicRoughness(material) => material.textures()[..2].iter().any(Option::is_some),
+            Reflection::Unlit(_) => true,
+        };
+        let is_lobe = self.has_lobe_texture() || self.refines_normals();
+        is_lobe && !has_colors && !self.is_emissive() && self.common.normals.is_none()
+    }
+
     /// Whether textures drive numbers of it.
     pub(crate) fn has_data(&self) -> bool {
         match &self.reflection {

@@ -6,7 +6,7 @@ use super::square::Square;
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
 use crate::integrate::TOLERANCE;
-use crate::material::{Bsdf, Colors, MeanLobe, ShadingPoint};
+use crate::material::{Bsdf, Colors, Lobe, MeanLobe, ShadingPoint};
 use crate::math::{DVec3, ErrorBound, Facet, Ray, Vec3};
 use crate::scene::{At, Hit, Opacity, PlacedSpot, Scene};
 use crate::shape::{Footprint, RayDifferential, SurfaceInteraction};
@@ -52,6 +52,13 @@ impl MeanBsdf {
     /// The mean of one material.
     pub fn constant(bsdf: Bsdf) -> MeanBsdf {
         MeanBsdf { bsdf, is_constant: true, contrast: Colors::BLACK, lobes_differ: false }
+    }
+
+    /// Whether the widths of lobes are off their mean by no more than such a part of it.
+    pub fn spans(lobes: impl IntoIterator<Item = Lobe>, part: f32) -> bool {
+        let mut mean = MeanLobe::new(Lobe::None);
+        lobes.into_iter().for_each(|lobe| mean.add(lobe));
+        mean.mean(part).is_some()
     }
 
     /// The mean of at least one material.
