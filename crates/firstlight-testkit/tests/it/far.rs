@@ -3,7 +3,7 @@
 use firstlight::{
     BoxDesc, CameraDesc, CameraHit, ColorParam, CompileOptions, CylinderDesc, DVec3, DiskLightDesc, Image, LightDesc,
     LightId, MemoryAssets, MeshDesc, ModelSettings, NoAssets, PlaneDesc, PointSetDesc, RayDifferential, RenderSettings,
-    SampleSet, Scene, SceneDesc, ShapeDesc, SphereLightDesc, Vec3, WorldRay, read_mesh,
+    SampleSet, Scene, SceneDesc, ShapeDesc, SphereLightDesc, WorldRay, read_mesh,
 };
 
 use firstlight_testkit::Random;

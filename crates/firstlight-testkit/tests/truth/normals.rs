@@ -33,8 +33,8 @@ const TURN: f64 = std::f64::consts::TAU;
 
 /// Waves along u and v: their height from -1 to 1, and its slopes.
 fn wave(u: f64, v: f64) -> [f64; 3] {
-    let (sin_u, cos_u) = (3.0 * TURN * u).sin_cos();
-    let (sin_v, cos_v) = (2.0 * TURN * v + 0.5).sin_cos();
+    let (sin_u, cos_u) = pxfm::f_sincos(3.0 * TURN * u);
+    let (sin_v, cos_v) = pxfm::f_sincos(2.0 * TURN * v + 0.5);
     [sin_u * sin_v, 3.0 * TURN * cos_u * sin_v, 2.0 * TURN * sin_u * cos_v]
 }
 
@@ -53,7 +53,7 @@ fn files() -> MemoryAssets {
     };
     // A noise of texels that no two have the same of
     let rough = |u: f64, v: f64| {
-        let noise = |k: f64| ((u * 12.9898 + v * 78.233 + k) * 43758.5453).sin() * 2.0;
+        let noise = |k: f64| pxfm::f_sin((u * 12.9898 + v * 78.233 + k) * 43758.5453) * 2.0;
         [noise(0.0), noise(1.0)]
     };
     let files = [
@@ -342,7 +342,7 @@ fn every_renderer_has_the_bits_of_the_plain_one() {
 fn integrated_light_is_that_of_many_points() {
     let exact = picture(&every_kind("samples = \"exact\""), &one_thread());
     let many = picture(&every_kind("samples = 4096"), &every_ray());
-    let steps = |v: f32| 255.0 * v.clamp(0.0, 1.0).powf(1.0 / 2.2);
+    let steps = |v: f32| 255.0 * pxfm::f_powf(v.clamp(0.0, 1.0), 1.0 / 2.2);
     let apart: Vec<f32> = exact
         .pixels
         .iter()

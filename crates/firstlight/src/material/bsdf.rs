@@ -246,3 +246,31 @@ impl Lobe {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lobes_that_differ_little_have_a_mean() {
+        let mean = |lobes: &[Lobe]| {
+            let mut mean = MeanLobe::new(lobes[0]);
+            lobes[1..].iter().for_each(|lobe| mean.add(*lobe));
+            mean.mean(0.05)
+        };
+        let ggx = |alpha: f32| Lobe::Ggx(GgxLobe { alpha, grazing: 0.5 });
+        let phong = |exponent: f32| Lobe::Phong(PhongLobe::new(exponent));
+        assert_eq!(mean(&[ggx(0.2), Lobe::None, ggx(0.2)]), Some(ggx(0.2)));
+        assert_eq!(mean(&[Lobe::None, ggx(0.2)]), Some(ggx(0.2)));
+        assert_eq!(mean(&[Lobe::None, Lobe::None]), Some(Lobe::None));
+        let Some(Lobe::Ggx(two)) = mean(&[ggx(0.2), ggx(0.21)]) else { panic!("they are near") };
+        assert!((two.alpha - 0.205).abs() < 1e-6 && two.grazing == 0.5);
+        assert_eq!(mean(&[ggx(0.2), ggx(0.23)]), None);
+        assert_eq!(mean(&[ggx(0.2), Lobe::Ggx(GgxLobe { alpha: 0.2, grazing: 0.7 })]), None);
+        // An exponent may differ twice as much
+        assert!(mean(&[phong(20.0), phong(23.0)]).is_some_and(|lobe| lobe.numbers()[0] == 21.5));
+        assert_eq!(mean(&[phong(20.0), phong(26.0)]), None);
+        assert_eq!(mean(&[phong(20.0), Lobe::BlinnPhong(BlinnPhongLobe::new(20.0))]), None);
+        assert!(ggx(0.2).is_near(ggx(0.2003), 0.002) && !ggx(0.2).is_near(ggx(0.201), 0.002));
+    }
+}

@@ -132,3 +132,27 @@ impl GgxLobe {
         ((alpha2 / (t * t)) * (0.5 / self.alpha)).max(1.0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normals_within_a_pixel_widen_the_highlight() {
+        let lobe = GgxLobe::new(0.3, 0.5);
+        assert_eq!(lobe.widened(0.0), lobe);
+        // What is small is ignored, and there is no step beyond
+        let alpha2 = 0.3f32 * 0.3 * 0.3 * 0.3;
+        let least = 0.5 * alpha2 * UNSEEN;
+        assert_eq!(lobe.widened(least * 0.999), lobe);
+        assert!((lobe.widened(least * 1.001).alpha - lobe.alpha).abs() < 1e-5);
+        // alpha^2 + 2 s^2
+        let wide = lobe.widened(0.02);
+        assert!((wide.alpha * wide.alpha - (alpha2 + 0.04)).abs() < alpha2 * 0.02, "{}", wide.alpha);
+        assert_eq!(wide.grazing, lobe.grazing);
+        // Toksvig's limit: normals that cancel each other leave a rough surface
+        for variance in [0.5, 1e3, 1e30, f32::INFINITY] {
+            assert_eq!(lobe.widened(variance).alpha, 1.0);
+        }
+    }
+}

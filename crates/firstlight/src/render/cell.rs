@@ -438,8 +438,7 @@ impl<'a> CellRenderer<'a> {
                 // A light that is seen from all of the fragment varies with the direction to it
                 let is_nearly_uniform = || {
                     let is_ggx = matches!(fragment.mean.bsdf.lobe, Lobe::Ggx(_));
-                    let most = if is_ggx { TOLERANCE.middle_turn_ggx } else { TOLERANCE.middle_turn };
-                    center.turn <= most
+                    center.turn <= if is_ggx { TOLERANCE.ggx_turn } else { TOLERANCE.middle_turn }
                         && self.bend(fragment, light, center, [center.turned(), 0.0]) <= TOLERANCE.middle_bend
                 };
                 let is_dark = center.moments == Moments::ZERO;
@@ -456,11 +455,11 @@ impl<'a> CellRenderer<'a> {
         let bend = (turned + kink) * estimate.most;
         let bsdf = &fragment.mean.bsdf;
         let highlight = match bsdf.lobe {
-            // The second derivative of D is at most 4 D / alpha^2 everywhere, so a part `turned` is what the farthest
-            // ray is off; the mean over a square is off by a third of that, and a little more by masking
-            Lobe::Ggx(_) => {
+            // The second derivative of D is at most 4 D / alpha^2, so the farthest ray is off by a part `turned`; the
+            // mean over a square is by a third of that, and a little more by masking
+            Lobe::Ggx(_) if estimate.turn <= TOLERANCE.ggx_turn => {
                 let here = estimate.moments.0[1].max(estimate.moments.0[2]);
-                (bend * bsdf.lobe.most()).min(0.5 * turned * here + kink * estimate.most * bsdf.lobe.most())
+                0.5 * turned * here + kink * estimate.most * bsdf.lobe.most()
             }
             _ => bend * bsdf.lobe.most(),
         };

@@ -164,3 +164,41 @@ impl Geometry {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn raised_normals_face_the_viewer_and_mirror_above_the_surface() {
+        let ng = Vec3::Z;
+        let mut changed = [0; 2];
+        for k in 0..20_000u32 {
+            // Viewers and normals all around, from grazing to straight on
+            let at = |step: u32, of: u32| (k / step % of) as f32 / of as f32;
+            let (z, turn, lean) = (0.0005 + 0.999 * at(1, 25) * at(1, 25), at(25, 20), at(500, 40));
+            let ring = (1.0 - z * z).sqrt();
+            let wo = Vec3::new(ring, 0.0, z);
+            let (sin, cos) = crate::math::sin_cos_of_turns(f64::from(turn));
+            let (tip, up) = crate::math::sin_cos_of_turns(f64::from(0.5 * lean));
+            let ns = Vec3::new((tip * cos) as f32, (tip * sin) as f32, up as f32).normalize();
+            for has_lobe in [false, true] {
+                let raised = raised(ng, wo, ns, has_lobe);
+                assert!((raised.length() - 1.0).abs() < 1e-4, "{wo} {ns} {raised}");
+                assert!(raised.dot(wo) > 0.0, "{wo} {ns} {raised}");
+                if !has_lobe {
+                    assert!(raised.dot(wo) > 0.0099, "{wo} {ns} {raised}");
+                    let front = if ns.z < 0.0 { -ns } else { ns };
+                    assert!(front.dot(wo) < 0.01 || raised == front, "{wo} {ns} {raised}");
+                    changed[0] += u32::from(raised != ns);
+                } else {
+                    let mirrored = raised * (2.0 * raised.dot(wo)) - wo;
+                    assert!(mirrored.z >= 0.01f32.min(0.9 * z) - 2e-3, "{wo} {ns} {raised} {mirrored}");
+                    changed[1] += u32::from(raised != ns);
+                }
+            }
+        }
+        assert!(changed[0] > 1000 && changed[1] > changed[0], "{changed:?}");
+        assert_eq!(raised(ng, Vec3::new(0.6, 0.0, 0.8), Vec3::Z, true), Vec3::Z);
+    }
+}
