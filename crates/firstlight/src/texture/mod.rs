@@ -126,7 +126,6 @@ impl Texture {
 }
 
 /// Where the parameters of materials come from: numbers, and textures by name.
-#[allow(dead_code, reason = "materials with maps and masks come next")]
 pub(crate) trait Params {
     /// A radiance: 0 or more in each channel. What alpha its texture has does not matter to it.
     fn radiance(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb>;
@@ -136,6 +135,7 @@ pub(crate) trait Params {
 
     /// A colour whose texture's alpha says where there is anything: smaller pictures are weighted by it. The alpha of
     /// [`Texture::value`] goes with it.
+    #[allow(dead_code, reason = "no material hides what is transparent in its colour yet")]
     fn covered_color(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb>;
 
     /// A number in a range.
