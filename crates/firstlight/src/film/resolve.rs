@@ -41,8 +41,8 @@ struct KeptSum {
     pixels: Vec<[f32; 3]>,
 }
 
-/// Sums over the rays of a pixel of all terms but the light of lights. Of a ray with layers each counts as the part of the
-/// ray that ends there.
+/// Sums over the rays of a pixel of all terms but the light of lights. Of a ray with layers each counts as the part of
+/// the ray that ends there.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PixelTerms {
     /// The parts of rays that nothing stops: 1 of each without a hit.

@@ -63,15 +63,13 @@ pub(crate) struct Tolerance {
     /// The length of a difference of unit normals: their deviation from linear variation or from their mean. Beyond it
     /// there is a crease.
     pub even: f32,
-    /// A part of the colour: the deviation from their mean of colours that are replaced by it.
+    /// A part of the colour: the deviation from their mean of colours that are replaced by it; and of a highlight in a
+    /// pixel of a block whose lobe has another width.
     pub same_mean: f32,
     /// A part of the width of a lobe: the deviation from their mean of widths that are replaced by it. A peak falls as
     /// the square of its width, so where widths vary evenly over a pixel the mean of peaks is off by half the square of
     /// that, 0.003 of a highlight: 0.3 display steps of the brightest.
     pub same_lobe: f32,
-    /// The same of the pixels of a block, each in place of a pixel of another width: a peak is off by twice that, by
-    /// half a display step if it is the brightest.
-    pub block_lobe: f32,
 
     // Rays of a pixel
     /// In display steps, the tolerance from which every second ray of a pixel samples an area light for all of them.
@@ -146,7 +144,6 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     even: 0.01,
     same_mean: 0.004,
     same_lobe: 0.08,
-    block_lobe: 0.002,
     half_of_rays: 16.0,
     first_points: 256.0,
     nearer: 4.0,

@@ -55,7 +55,8 @@ impl Classic {
     }
 
     /// In numbers. Where the slopes of mapped normals vary within a pixel, the highlight is wider: Toksvig, "Mipmapping
-    /// normal maps", Journal of Graphics Tools 10(3), 2005, eq. 3. `ambient`: see [`Material::evaluate`](super::Material).
+    /// normal maps", Journal of Graphics Tools 10(3), 2005, eq. 3. `ambient`: see
+    /// [`Material::evaluate`](super::Material).
     #[inline(always)]
     pub(super) fn evaluate(
         &self,

@@ -24,8 +24,8 @@ pub struct GgxLobe {
 
 /// The least alpha. A narrower highlight is a mirror image.
 const MIN_ALPHA: f32 = 0.003;
-/// A part of alpha^2: what other normals in a pixel may add to it without effect, so that the highlight is one all over a
-/// surface that is large in the picture. A peak is at most as much too bright: a display step of the brightest.
+/// A part of alpha^2: what other normals in a pixel may add to it without effect, so that the highlight is one all over
+/// a surface that is large in the picture. A peak is at most as much too bright: a display step of the brightest.
 const UNSEEN: f32 = 0.01;
 /// The least cosine to the viewer: smooth normals of facets may be turned away.
 const MIN_COS: f32 = 1e-4;

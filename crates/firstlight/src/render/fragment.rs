@@ -11,8 +11,6 @@ use crate::material::{Bsdf, Colors, ShadingPoint};
 use crate::math::{DVec3, Ray, Vec3};
 use crate::scene::Scene;
 
-/// The centers of the quadrants of a pixel.
-const QUADRANT_CENTERS: [[f32; 2]; 4] = [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]];
 /// Fragments of at most so many rays have no quadrants.
 const FEW_RAYS: usize = 4;
 
@@ -58,6 +56,11 @@ pub(crate) struct Fragment {
     quadrants: Option<Range<usize>>,
     /// Its rays among [`Fragments::rays`], once they are traced.
     pub rays: Range<usize>,
+}
+
+/// The centers of the quadrants of a pixel.
+fn quadrant_centers() -> [[f32; 2]; 4] {
+    [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]]
 }
 
 /// The fragments of a cell.
@@ -228,7 +231,7 @@ impl Fragments {
             return false;
         }
         let first = self.points.len();
-        for [x, y] in QUADRANT_CENTERS {
+        for [x, y] in quadrant_centers() {
             let (ray, _) = scene.camera.local_ray(i as f32 + x, j as f32 + y, 1.0);
             let Some(t) = shape.intersect(scene, &ray) else {
                 self.points.truncate(first);
@@ -249,8 +252,8 @@ impl Fragments {
         true
     }
 
-    /// Adds a pixel that provably sees one shape, by its center, with the mean material; `corners` are the points of the
-    /// shape at the corners of the pixel. `false` if the pixel has to be traced.
+    /// Adds a pixel that provably sees one shape, by its center, with the mean material; `corners` are the points of
+    /// the shape at the corners of the pixel. `false` if the pixel has to be traced.
     pub fn add_whole_center(
         &mut self,
         scene: &Scene,
@@ -302,7 +305,7 @@ impl Fragments {
         }
         let Some(Fragment { mean: own, quadrants, .. }) = self.all.last_mut() else { return false };
         *own = mean;
-        for (point, [x, y]) in quadrants.clone().unwrap_or_default().zip(QUADRANT_CENTERS) {
+        for (point, [x, y]) in quadrants.clone().unwrap_or_default().zip(quadrant_centers()) {
             let step = 1.0 / scene.antialiasing as f32;
             let (ray, differential) = scene.camera.local_ray(at[0] as f32 + x, at[1] as f32 + y, step);
             if let Some(t) = shape.intersect(scene, &ray) {

@@ -53,7 +53,8 @@ impl<'a> Lights<'a> {
         Lights { emitters, integrated, scales, steps, tree, targets, point_sets, obstacles, allowed, least }
     }
 
-    /// Whether anything in trees, or not opaque, may stop some of light `index`, but for planes that have a closed form.
+    /// Whether anything in trees, or not opaque, may stop some of light `index`, but for planes that have a closed
+    /// form.
     pub fn has_trees(&self, scene: &Scene, index: usize) -> bool {
         let geometry = &scene.geometry;
         let stops = |thing: &u32| geometry.stops(geometry.placed[*thing as usize].shadow, LightId(index as u32));

@@ -363,8 +363,8 @@ impl PointSet {
         nearest
     }
 
-    /// Visits every crossing of a sphere, 0 < t < `limit`, with its t and the number of the sphere, until `hit` says so:
-    /// whether it did. `single_sided`: only where the ray enters.
+    /// Visits every crossing of a sphere, 0 < t < `limit`, with its t and the number of the sphere, until `hit` says
+    /// so: whether it did. `single_sided`: only where the ray enters.
     #[inline(never)]
     pub fn each<S: Simd>(
         &self,

@@ -204,7 +204,8 @@ impl CellRenderer<'_> {
         let start = self.blocks.len();
         for (at, mean) in means {
             let MeanBsdf { bsdf, .. } = mean;
-            let is_alike = |block: &SurfaceBlock| block.bsdf.lobe.is_near(bsdf.lobe, TOLERANCE.block_lobe);
+            // A peak falls as the square of its width
+            let is_alike = |block: &SurfaceBlock| block.bsdf.lobe.is_near(bsdf.lobe, 0.5 * TOLERANCE.same_mean);
             let layer = self.blocks[start..].iter().position(is_alike).unwrap_or_else(|| {
                 let first = self.means.len();
                 self.means.resize(first + (square.side * square.side) as usize, None);

@@ -1,7 +1,7 @@
 //! Tangents of meshes for normal maps.
 //!
-//! MikkTSpace (Mikkelsen, "Simulation of wrinkled surfaces revisited", master's thesis, University of Copenhagen, 2008),
-//! which tools that make normal maps count from, on triangles that share no vertices.
+//! MikkTSpace (Mikkelsen, "Simulation of wrinkled surfaces revisited", master's thesis, University of Copenhagen,
+//! 2008), which tools that make normal maps count from, on triangles that share no vertices.
 
 use bevy_mikktspace::{Geometry, Ops, TangentSpace, generate_tangents};
 
