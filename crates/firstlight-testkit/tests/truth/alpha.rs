@@ -212,7 +212,8 @@ fn light_behind_a_sheet_is_half_and_behind_a_mask_has_holes() {
     let floor = "[[parallelogram]]\np = [-3, -3, 0]\ne0 = [6, 0, 0]\ne1 = [0, 6, 0]\n";
     let lid = |material: &str| {
         format!(
-            "[[parallelogram]]\np = [-3, -3, 2]\ne0 = [6, 0, 0]\ne1 = [0, 6, 0]\nmaterial = \"{material}\"\nvisible = false\n"
+            "[[parallelogram]]\np = [-3, -3, 2]\ne0 = [6, 0, 0]\ne1 = [0, 6, 0]\nmaterial = \"{material}\"\n\
+             visible = false\n"
         )
     };
     for light in [
@@ -230,8 +231,9 @@ fn light_behind_a_sheet_is_half_and_behind_a_mask_has_holes() {
     }
     // A lamp far above a mask: dark squares of its size, and lit ones
     let text = format!(
-        "[render]\nwidth = 70\nheight = 50\nantialiasing = 1\n[camera]\nposition = [0, 0, 9]\nprojection = \"orthographic\"\n\
-         height = 5\n[[light.directional]]\ndirection = [0, 0, -1]\n{MATERIALS}[[parallelogram]]\np = [-9, -9, 0]\n\
+        "[render]\nwidth = 70\nheight = 50\nantialiasing = 1\n[camera]\nposition = [0, 0, 9]\n\
+         projection = \"orthographic\"\nheight = 5\n[[light.directional]]\ndirection = [0, 0, -1]\n{MATERIALS}\
+         [[parallelogram]]\np = [-9, -9, 0]\n\
          e0 = [18, 0, 0]\ne1 = [0, 18, 0]\n[[parallelogram]]\np = [-3.5, -2.5, 2]\ne0 = [7, 0, 0]\ne1 = [0, 5, 0]\n\
          material = \"leaf\"\nvisible = false\n"
     );

@@ -59,16 +59,19 @@ impl Geometry {
     /// Whether camera rays inside of `planes` may meet anything that is not opaque.
     pub fn may_meet_layers(&self, level: Level, planes: &Planes) -> bool {
         let Some(layers) = &self.layers else { return false };
+        let misses_mesh = |item: u32| {
+            let UpperItem::Placed(index) = layers.items[item as usize] else { return false };
+            let Placed { placement, target: PlacedTarget::Mesh(mesh), .. } = &self.placed[index as usize] else {
+                return false;
+            };
+            let own = planes.placed(&placement.world_from_object, &placement.object_from_world);
+            let tree = &self.meshes[*mesh as usize].tree;
+            dispatch_eight!(level, simd => tree.gather(simd, |center, half| own.within(center, half).test(), |_| false))
+        };
         !layers.unbounded.is_empty()
-            || !dispatch_eight!(level, simd => layers.upper.gather(simd, |center, half| planes.within(center, half).test(), |item| {
-                let UpperItem::Placed(index) = layers.items[item as usize] else { return false };
-                let Placed { placement, target: PlacedTarget::Mesh(mesh), .. } = &self.placed[index as usize] else {
-                    return false;
-                };
-                let own = planes.placed(&placement.world_from_object, &placement.object_from_world);
-                let tree = &self.meshes[*mesh as usize].tree;
-                tree.gather(simd, |center, half| own.within(center, half).test(), |_| false)
-            }))
+            || !dispatch_eight!(level, simd => {
+                layers.upper.gather(simd, |center, half| planes.within(center, half).test(), misses_mesh)
+            })
     }
 
     /// The boxes around all that lies in trees and has an end.
