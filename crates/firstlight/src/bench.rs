@@ -210,7 +210,8 @@ impl Soft {
         let target = Target::new(&scene, light);
         let (mut points, mut tiles) = (Vec::new(), Vec::new());
         let still = Vec3::ZERO;
-        let differential = RayDifferential { dx: still, dy: still, origin_dx: still, origin_dy: still };
+        let differential =
+            RayDifferential { dx: still, dy: still, origin_dx: still, origin_dy: still, steps_per_pixel: 1.0 };
         for tile in camera.chunks(64) {
             let first = points.len() as u32;
             for ray in tile {

@@ -54,6 +54,20 @@ class _ShapeFields(TypedDict, total=False):
 class _MeshFields(_ShapeFields, total=False):
     smooth_deg: float | None
 
+class _MaterialFields(TypedDict, total=False):
+    emissive: ColorParam
+    emissive_strength: float
+    alpha: NumberParam
+    alpha_mode: Literal["opaque", "mask", "blend"]
+    cutoff: float
+    single_sided: bool
+    normal_map: str | None
+    normal_scale: float
+    bump_map: NumberParam
+    bump_scale: float
+    normal_fix: Literal["raise", "none"]
+    specular_antialiasing: bool
+
 @dataclass(frozen=True)
 class Place:
     """Where in a text something stands; lines and columns count from 1."""
@@ -350,8 +364,7 @@ class Scene:
         specular: ColorParam = ...,
         ambient: ColorParam | None = ...,
         shininess: NumberParam = ...,
-        emissive: ColorParam = ...,
-        emissive_strength: float = ...,
+        **fields: Unpack[_MaterialFields],
     ) -> Handle: ...
     def add_blinn_phong_material(
         self,
@@ -361,8 +374,7 @@ class Scene:
         specular: ColorParam = ...,
         ambient: ColorParam | None = ...,
         shininess: NumberParam = ...,
-        emissive: ColorParam = ...,
-        emissive_strength: float = ...,
+        **fields: Unpack[_MaterialFields],
     ) -> Handle: ...
     def add_metallic_roughness_material(
         self,
@@ -375,16 +387,14 @@ class Scene:
         specular: NumberParam = ...,
         specular_color: ColorParam = ...,
         occlusion: NumberParam = ...,
-        emissive: ColorParam = ...,
-        emissive_strength: float = ...,
+        **fields: Unpack[_MaterialFields],
     ) -> Handle: ...
     def add_unlit_material(
         self,
         name: str,
         *,
         color: ColorParam = ...,
-        emissive: ColorParam = ...,
-        emissive_strength: float = ...,
+        **fields: Unpack[_MaterialFields],
     ) -> Handle: ...
     def add_sphere(
         self,

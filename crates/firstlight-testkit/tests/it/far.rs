@@ -3,7 +3,7 @@
 use firstlight::{
     BoxDesc, CameraDesc, CameraHit, ColorParam, CompileOptions, CylinderDesc, DVec3, DiskLightDesc, Image, LightDesc,
     LightId, MemoryAssets, MeshDesc, ModelSettings, NoAssets, PlaneDesc, PointSetDesc, RayDifferential, RenderSettings,
-    SampleSet, Scene, SceneDesc, ShapeDesc, SphereLightDesc, Vec3, WorldRay, read_mesh,
+    SampleSet, Scene, SceneDesc, ShapeDesc, SphereLightDesc, WorldRay, read_mesh,
 };
 
 use firstlight_testkit::Random;
@@ -126,7 +126,7 @@ fn a_detailed_model_is_the_same_wherever_it_is() {
 
 #[test]
 fn rays_and_answers_are_in_the_coordinates_of_the_world() {
-    let still = RayDifferential { dx: Vec3::ZERO, dy: Vec3::ZERO, origin_dx: Vec3::ZERO, origin_dy: Vec3::ZERO };
+    let still = RayDifferential::default();
     let here = compiled(&scene([0.0; 3], false));
     for at in PLACES {
         let there = compiled(&scene(at, true));

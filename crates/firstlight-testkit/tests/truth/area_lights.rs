@@ -130,12 +130,7 @@ fn seen(light: LightDesc, eye: V, target: V) -> Option<f32> {
     let scene = compile(&empty(1, 1, 1).with_light(light).with_camera(camera(eye, target, 1.0)));
     let d = unit(sub(target, eye)).map(|x| x as f32);
     let ray = firstlight::WorldRay { o: eye.into(), d: d.into() };
-    let still = firstlight::RayDifferential {
-        dx: [0.0; 3].into(),
-        dy: [0.0; 3].into(),
-        origin_dx: [0.0; 3].into(),
-        origin_dy: [0.0; 3].into(),
-    };
+    let still = firstlight::RayDifferential::default();
     match scene.look(&ray, &still) {
         CameraHit::Emission(color) => Some(color.r),
         CameraHit::Background => None,

@@ -23,6 +23,7 @@ mod materials;
 mod meshes;
 mod motion;
 mod near;
+mod normals;
 mod proved;
 mod relight;
 mod robust;

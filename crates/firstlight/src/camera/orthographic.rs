@@ -53,8 +53,9 @@ impl Orthographic {
         let Frame { start, right, up, forward, .. } = self.frame;
         let [film_x, film_y] = self.film.place(x, y);
         let [step_x, step_y] = self.film.steps(step);
-        let differential =
-            RayDifferential { dx: Vec3::ZERO, dy: Vec3::ZERO, origin_dx: right * step_x, origin_dy: up * step_y };
+        let (origin_dx, origin_dy) = (right * step_x, up * step_y);
+        let steps_per_pixel = 1.0 / step;
+        let differential = RayDifferential { dx: Vec3::ZERO, dy: Vec3::ZERO, origin_dx, origin_dy, steps_per_pixel };
         (Ray { o: start + right * film_x + up * film_y, d: forward }, differential)
     }
 

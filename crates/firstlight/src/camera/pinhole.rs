@@ -59,6 +59,7 @@ impl Pinhole {
             dy: up * (step_y / length),
             origin_dx: right * (step_x * near),
             origin_dy: up * (step_y * near),
+            steps_per_pixel: 1.0 / step,
         };
         let o = start + (right * (film_x * near) + up * (film_y * near));
         (Ray { o, d: towards / length }, differential)

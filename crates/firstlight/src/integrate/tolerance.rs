@@ -50,6 +50,9 @@ pub(crate) struct Tolerance {
     pub motion: f32,
     /// In radians or widths of a highlight: the change of direction over a fragment whose middle stands for all of it.
     pub middle_turn: f32,
+    /// The same of microfacets, and of their quadrants: within an eighth of the width of the lobe the second derivative
+    /// at the middle stands for that of all rays.
+    pub ggx_turn: f32,
     /// In display steps: the second-order change from a middle to its farthest ray, and from that of a quadrant. The
     /// mean over the rays of a quadrant is off by far less: signs differ. Runs: of the first, rms 0.104 and 0.104, time
     /// 1.02 and 1.00; of the second, the same rms, time 1.04 and 0.96 on config 11.
@@ -60,8 +63,13 @@ pub(crate) struct Tolerance {
     /// The length of a difference of unit normals: their deviation from linear variation or from their mean. Beyond it
     /// there is a crease.
     pub even: f32,
-    /// A part of the colour: the deviation from their mean of colours that are replaced by it.
+    /// A part of the colour: the deviation from their mean of colours that are replaced by it; and of a highlight in a
+    /// pixel of a block whose lobe has another width.
     pub same_mean: f32,
+    /// A part of the width of a lobe: the deviation from their mean of widths that are replaced by it. A peak falls as
+    /// the square of its width, so where widths vary evenly over a pixel the mean of peaks is off by half the square of
+    /// that, 0.003 of a highlight: 0.3 display steps of the brightest.
+    pub same_lobe: f32,
 
     // Rays of a pixel
     /// In display steps, the tolerance from which every second ray of a pixel samples an area light for all of them.
@@ -93,9 +101,6 @@ pub(crate) struct Tolerance {
     pub stratified: f32,
     /// A factor of the mean contribution: strata beyond it are split.
     pub heavy: f32,
-    /// A part of a sample's light: samples of a group of which layers leave parts that differ by less are dimmed alike,
-    /// and the group is not one that a silhouette crosses.
-    pub same_left: f32,
     /// In pixels: the weight of a pixel at which others are interpolated. It is the mean sum of squares of the nine
     /// interpolation weights, so that noise makes the same error as in a pixel of its own.
     pub node_pixels: f32,
@@ -132,11 +137,13 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     spread: 5.0,
     motion: 0.3,
     middle_turn: 0.06,
+    ggx_turn: 0.25,
     middle_bend: 0.1,
     quadrant_bend: 3.0,
     color_light_covariance: 0.4,
     even: 0.01,
     same_mean: 0.004,
+    same_lobe: 0.08,
     half_of_rays: 16.0,
     first_points: 256.0,
     nearer: 4.0,
@@ -148,7 +155,6 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     few_groups: 14.0,
     stratified: 0.5,
     heavy: 2.0,
-    same_left: 1.0 / 32.0,
     node_pixels: 0.64,
     cut_error: 1.5,
     lenient: 1.25,

@@ -69,6 +69,66 @@ pub enum Lobe {
     Ggx(GgxLobe),
 }
 
+/// The mean of the lobes of several surfaces, of which some may have none.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MeanLobe {
+    /// One of them, if any has one.
+    one: Lobe,
+    /// Whether all that there are, are that one.
+    is_same: bool,
+    /// Whether all are of its kind.
+    is_one_kind: bool,
+    count: f32,
+    sum: [f32; LOBE_NUMBERS],
+    least: [f32; LOBE_NUMBERS],
+    most: [f32; LOBE_NUMBERS],
+}
+
+impl MeanLobe {
+    /// Of one surface.
+    pub fn new(lobe: Lobe) -> MeanLobe {
+        let numbers = lobe.numbers();
+        let count = if lobe == Lobe::None { 0.0 } else { 1.0 };
+        MeanLobe { one: lobe, is_same: true, is_one_kind: true, count, sum: numbers, least: numbers, most: numbers }
+    }
+
+    /// Adds that of another one.
+    pub fn add(&mut self, lobe: Lobe) {
+        if lobe == Lobe::None {
+            return;
+        }
+        if self.one == Lobe::None {
+            *self = MeanLobe::new(lobe);
+            return;
+        }
+        self.is_same &= lobe == self.one;
+        self.is_one_kind &= lobe.kind() == self.one.kind();
+        self.count += 1.0;
+        for (k, number) in lobe.numbers().into_iter().enumerate() {
+            self.sum[k] += number;
+            (self.least[k], self.most[k]) = (self.least[k].min(number), self.most[k].max(number));
+        }
+    }
+
+    /// The lobe that stands for all; `None` where their widths are off their mean by more than such a part of it.
+    pub fn mean(&self, allowed: f32) -> Option<Lobe> {
+        if self.is_same {
+            return Some(self.one);
+        }
+        let half: [f32; LOBE_NUMBERS] = std::array::from_fn(|k| 0.5 * (self.most[k] - self.least[k]));
+        let off = half[0] / (0.5 * (self.most[0] + self.least[0]));
+        let mean = self.sum.map(|sum| sum / self.count);
+        let (off, lobe) = match self.one {
+            Lobe::None => return Some(Lobe::None),
+            Lobe::Ggx(_) => (off.max(half[1]), Lobe::Ggx(GgxLobe { alpha: mean[0], grazing: mean[1] })),
+            // The square of the width is the inverse of the exponent
+            Lobe::Phong(_) => (0.5 * off, Lobe::Phong(PhongLobe::new(mean[0]))),
+            Lobe::BlinnPhong(_) => (0.5 * off, Lobe::BlinnPhong(BlinnPhongLobe::new(mean[0]))),
+        };
+        (self.is_one_kind && off <= allowed).then_some(lobe)
+    }
+}
+
 impl Lobe {
     /// The lobe of surfaces of which some have the one and some the other, or none; `None` if they have different ones.
     pub(crate) fn with(self, other: Lobe) -> Option<Lobe> {
@@ -76,6 +136,13 @@ impl Lobe {
             (lobe, Lobe::None) | (Lobe::None, lobe) => Some(lobe),
             (one, other) => (one == other).then_some(one),
         }
+    }
+
+    /// Whether its width is that of another of its kind, but for such a part.
+    pub(crate) fn is_near(self, other: Lobe, part: f32) -> bool {
+        let mut mean = MeanLobe::new(self);
+        mean.add(other);
+        mean.mean(0.5 * part).is_some()
     }
 
     /// The moments of light of unit weight, from the cosines n.wi > 0, n.wo >= 0 and wi.wo: the part of the base, then
@@ -177,5 +244,33 @@ impl Lobe {
                 Highlight::of_power(lobe.exponent(), at, half(nearest), sin, [k, 2.0 * k + 3.0 * k * k])
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lobes_that_differ_little_have_a_mean() {
+        let mean = |lobes: &[Lobe]| {
+            let mut mean = MeanLobe::new(lobes[0]);
+            lobes[1..].iter().for_each(|lobe| mean.add(*lobe));
+            mean.mean(0.05)
+        };
+        let ggx = |alpha: f32| Lobe::Ggx(GgxLobe { alpha, grazing: 0.5 });
+        let phong = |exponent: f32| Lobe::Phong(PhongLobe::new(exponent));
+        assert_eq!(mean(&[ggx(0.2), Lobe::None, ggx(0.2)]), Some(ggx(0.2)));
+        assert_eq!(mean(&[Lobe::None, ggx(0.2)]), Some(ggx(0.2)));
+        assert_eq!(mean(&[Lobe::None, Lobe::None]), Some(Lobe::None));
+        let Some(Lobe::Ggx(two)) = mean(&[ggx(0.2), ggx(0.21)]) else { panic!("they are near") };
+        assert!((two.alpha - 0.205).abs() < 1e-6 && two.grazing == 0.5);
+        assert_eq!(mean(&[ggx(0.2), ggx(0.23)]), None);
+        assert_eq!(mean(&[ggx(0.2), Lobe::Ggx(GgxLobe { alpha: 0.2, grazing: 0.7 })]), None);
+        // An exponent may differ twice as much
+        assert!(mean(&[phong(20.0), phong(23.0)]).is_some_and(|lobe| lobe.numbers()[0] == 21.5));
+        assert_eq!(mean(&[phong(20.0), phong(26.0)]), None);
+        assert_eq!(mean(&[phong(20.0), Lobe::BlinnPhong(BlinnPhongLobe::new(20.0))]), None);
+        assert!(ggx(0.2).is_near(ggx(0.2003), 0.002) && !ggx(0.2).is_near(ggx(0.201), 0.002));
     }
 }

@@ -55,24 +55,35 @@ impl Classic {
         }
     }
 
-    /// In numbers; `ambient`: see [`Material::evaluate`](super::Material).
+    /// In numbers. Where the slopes of mapped normals vary within a pixel, the highlight is wider: Toksvig, "Mipmapping
+    /// normal maps", Journal of Graphics Tools 10(3), 2005, eq. 3. `ambient`: see
+    /// [`Material::evaluate`](super::Material).
     #[inline(always)]
     pub(super) fn evaluate(
         &self,
         color: impl Fn(&Param<Rgb>) -> Rgb,
         number: impl Fn(&Param<f32>) -> f32,
         ambient: Option<(&Ambient, ViewGeometry)>,
+        slope_variance: f32,
     ) -> Bsdf {
         let diffuse = color(&self.diffuse);
         // The same texture in both is looked up once: config 11 has it so everywhere
-        let specular = match (self.specular.texture, self.diffuse.texture) {
+        let mut specular = match (self.specular.texture, self.diffuse.texture) {
             (Some(s), Some(d)) if s == d && self.specular.factor == self.diffuse.factor => diffuse,
             _ => color(&self.specular),
         };
         let lobe = if specular.is_black() {
             Lobe::None
         } else {
-            let shininess = number(&self.shininess).clamp(0.0, MAX_SHININESS);
+            let mut shininess = number(&self.shininess).clamp(0.0, MAX_SHININESS);
+            if slope_variance > 0.0 {
+                // 1 over the exponent is the variance of slopes; around the mirror direction a normal counts twice
+                let times = if self.lobe == LobeKind::Phong { 4.0 } else { 1.0 };
+                let wide = shininess / (1.0 + shininess * (slope_variance * times));
+                // As much light in all
+                specular = specular * ((1.0 + wide) / (1.0 + shininess));
+                shininess = wide;
+            }
             match self.lobe {
                 LobeKind::Phong => Lobe::Phong(PhongLobe::new(shininess)),
                 _ => Lobe::BlinnPhong(BlinnPhongLobe::new(shininess)),

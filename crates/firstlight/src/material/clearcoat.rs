@@ -1,6 +1,6 @@
 //! A clear coat over another material.
 
-use super::{Ambient, Bsdf, GgxLobe, Lobe, PerMoment, ViewGeometry};
+use super::{Ambient, Bsdf, GgxLobe, Lobe, NormalMapping, PerMoment, ViewGeometry};
 use crate::color::Rgb;
 use crate::ids::TextureId;
 use crate::texture::Param;
@@ -13,6 +13,8 @@ use crate::texture::Param;
 pub struct Clearcoat {
     pub(super) strength: Param<f32>,
     pub(super) roughness: Param<f32>,
+    /// What bends its shading normal: the maps of the material do not.
+    pub(super) normals: Option<NormalMapping>,
 }
 
 /// The reflectance of an interface of index 1.5 seen from the front.
@@ -26,24 +28,27 @@ impl Clearcoat {
         number(&self.strength).clamp(0.0, 1.0) * (F0 + (1.0 - F0) * (off2 * off2 * off))
     }
 
-    /// The coat in numbers, as a surface by itself; `occlusion` is the part of ambient light that arrives.
+    /// The coat in numbers, as a surface by itself; `occlusion` is the part of ambient light that arrives, and
+    /// `slope_variance` that of the normals of the coat within the pixel.
     pub(super) fn evaluate(
         &self,
         ambient: &Ambient,
         view: &ViewGeometry,
         occlusion: f32,
+        slope_variance: f32,
         number: impl Fn(&Param<f32>) -> f32,
     ) -> Bsdf {
         let reflectance = Rgb::gray(self.reflectance(view, &number));
-        let lobe = GgxLobe::new(number(&self.roughness).clamp(0.0, 1.0), 0.0);
+        let lobe = GgxLobe::new(number(&self.roughness).clamp(0.0, 1.0), 0.0).widened(slope_variance);
         let [near, grazing] = lobe.white_albedo(view.cos_o());
         let ambient = ambient.answer(view, Rgb::BLACK, reflectance * (near + grazing)) * occlusion;
         Bsdf { colors: PerMoment([Rgb::BLACK, reflectance, reflectance]), ambient, lobe: Lobe::Ggx(lobe) }
     }
 
     /// The textures of its parameters.
-    pub(super) fn textures(&self) -> [Option<TextureId>; 2] {
-        [self.strength.texture, self.roughness.texture]
+    pub(super) fn textures(&self) -> [Option<TextureId>; 3] {
+        let map = self.normals.and_then(|normals| normals.map);
+        [self.strength.texture, self.roughness.texture, map.map(|(texture, _)| texture)]
     }
 }
 
@@ -55,10 +60,11 @@ mod tests {
     #[test]
     fn a_coat_reflects_what_the_extension_says() {
         let (strength, roughness) = (0.7, 0.4);
-        let coat = Clearcoat { strength: Param::constant(strength), roughness: Param::constant(roughness) };
+        let coat =
+            Clearcoat { strength: Param::constant(strength), roughness: Param::constant(roughness), normals: None };
         let (ns, wo, wi) = (Vec3::Z, Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.48, 0.64, 0.6));
         let view = ViewGeometry { ns, wo };
-        let bsdf = coat.evaluate(&Ambient::default(), &view, 1.0, |param| param.factor);
+        let bsdf = coat.evaluate(&Ambient::default(), &view, 1.0, 0.0, |param| param.factor);
         let moments = bsdf.lobe.eval(wi.z, wo.z, wi.dot(wo));
         let found = f64::from(bsdf.colors.of(&moments).r);
         // F(n.wo) D V (n.wi) pi, in another form
@@ -75,7 +81,7 @@ mod tests {
 
     #[test]
     fn a_coat_at_a_grazing_angle_reflects_all_light() {
-        let coat = Clearcoat { strength: Param::constant(1.0), roughness: Param::constant(0.0) };
+        let coat = Clearcoat { strength: Param::constant(1.0), roughness: Param::constant(0.0), normals: None };
         let view = ViewGeometry { ns: Vec3::Z, wo: Vec3::X };
         assert_eq!(coat.reflectance(&view, |param| param.factor), 1.0);
         let behind = ViewGeometry { ns: Vec3::Z, wo: -Vec3::Z };

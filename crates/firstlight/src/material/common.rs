@@ -1,6 +1,6 @@
 //! What materials of all kinds have.
 
-use super::{Alpha, AlphaMode};
+use super::{Alpha, AlphaMode, NormalFix, NormalMapping};
 use crate::color::Rgb;
 use crate::context::CompileContext;
 use crate::describe::{ColorParam, NumberParam, table};
@@ -27,6 +27,20 @@ table! {
         /// Whether camera rays pass through from behind, the side that normals point away from. Light is blocked from
         /// both sides all the same.
         pub single_sided: bool = false,
+        /// The name of a normal map: a texture of the kind `image` whose red, green and blue from 0 to 1 are x, y and z
+        /// of unit normals from -1 to 1. x runs with u, y with v, which is up in the picture, as in glTF.
+        pub normal_map: Option<String> = None,
+        /// Multiplies x and y of the normal map: -10000 to 10000.
+        pub normal_scale: f64 = 1.0,
+        /// The height of a bump map above the surface, in units of `bump_scale`: `{ texture = "NAME" }`.
+        pub bump_map: NumberParam = NumberParam::constant(0.0),
+        /// Multiplies `bump_map`: metres for 1 of the texture's value, -10000 to 10000.
+        pub bump_scale: f64 = 1.0,
+        /// What is made of mapped normals that face away from the viewer, or mirror the viewer below the surface.
+        pub normal_fix: NormalFix = NormalFix::Raise,
+        /// Whether highlights are widened by as much as normals vary within a pixel: those of a normal map, and of what
+        /// curves under metallic-roughness. Without it small highlights flicker from frame to frame.
+        pub specular_antialiasing: bool = true,
     }
 }
 
@@ -39,6 +53,12 @@ pub struct MaterialCommon {
     pub alpha: Option<Alpha>,
     /// Whether camera rays pass through from behind.
     pub single_sided: bool,
+    /// What bends the shading normal.
+    pub normals: Option<NormalMapping>,
+    /// What is made of bent normals that face away.
+    pub normal_fix: NormalFix,
+    /// Whether highlights are widened by as much as normals vary within a pixel.
+    pub specular_antialiasing: bool,
 }
 
 impl MaterialCommonDesc {
@@ -47,7 +67,10 @@ impl MaterialCommonDesc {
         cx.between("emissive_strength", self.emissive_strength, 0.0, MAX_EMISSION, None);
         emissive.factor = emissive.factor * self.emissive_strength as f32;
         let alpha = self.compile_alpha(cx, params);
-        MaterialCommon { emissive, alpha, single_sided: self.single_sided }
+        let map = (self.normal_map.as_deref(), self.normal_scale);
+        let normals = NormalMapping::compile(cx, params, map, (&self.bump_map, self.bump_scale));
+        let MaterialCommonDesc { single_sided, normal_fix, specular_antialiasing, .. } = *self;
+        MaterialCommon { emissive, alpha, single_sided, normals, normal_fix, specular_antialiasing }
     }
 
     fn compile_alpha(&self, cx: &mut CompileContext, params: &mut impl Params) -> Option<Alpha> {
@@ -76,11 +99,19 @@ impl MaterialCommonDesc {
 impl MaterialCommon {
     /// That of materials that say nothing of it.
     pub(super) fn none() -> MaterialCommon {
-        MaterialCommon { emissive: Param::constant(Rgb::BLACK), alpha: None, single_sided: false }
+        MaterialCommon {
+            emissive: Param::constant(Rgb::BLACK),
+            alpha: None,
+            single_sided: false,
+            normals: None,
+            normal_fix: NormalFix::Raise,
+            specular_antialiasing: true,
+        }
     }
 
     /// The textures of its parameters.
-    pub(super) fn textures(&self) -> [Option<TextureId>; 1] {
-        [self.emissive.texture]
+    pub(super) fn textures(&self) -> [Option<TextureId>; 3] {
+        let [map, bump] = self.normals.map_or([None; 2], |normals| normals.textures());
+        [self.emissive.texture, map, bump]
     }
 }

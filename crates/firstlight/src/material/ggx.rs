@@ -24,6 +24,9 @@ pub struct GgxLobe {
 
 /// The least alpha. A narrower highlight is a mirror image.
 const MIN_ALPHA: f32 = 0.003;
+/// A part of alpha^2: what other normals in a pixel may add to it without effect, so that the highlight is one all over
+/// a surface that is large in the picture. A peak is at most as much too bright: a display step of the brightest.
+const UNSEEN: f32 = 0.01;
 /// The least cosine to the viewer: smooth normals of facets may be turned away.
 const MIN_COS: f32 = 1e-4;
 /// The least square of the length of wi + wo: opposite directions have no half vector.
@@ -41,6 +44,22 @@ impl GgxLobe {
     /// `roughness` and `grazing` from 0 to 1.
     pub(super) fn new(roughness: f32, grazing: f32) -> Self {
         GgxLobe { alpha: (roughness * roughness).max(MIN_ALPHA), grazing }
+    }
+
+    /// Whether such a variance of the slopes of normals leaves it as it is.
+    pub(super) fn ignores(&self, slope_variance: f32) -> bool {
+        2.0 * slope_variance <= self.alpha * self.alpha * UNSEEN
+    }
+
+    /// The same where the slopes of normals vary as much within a pixel: alpha^2 is twice the variance of slopes.
+    #[inline(always)]
+    pub(super) fn widened(self, slope_variance: f32) -> Self {
+        if self.ignores(slope_variance) {
+            return self;
+        }
+        // Less what is ignored: it begins without a step
+        let alpha2 = self.alpha * self.alpha;
+        GgxLobe { alpha: (alpha2 + (2.0 * slope_variance - alpha2 * UNSEEN)).min(1.0).sqrt(), ..self }
     }
 
     /// The transmitted cosine, the f0 part and the f90 part, from the cosines n.wi > 0, n.wo and wi.wo. Never negative,
@@ -111,5 +130,29 @@ impl GgxLobe {
         let t = (1.0 - cos_h * cos_h) + cos_h * cos_h * alpha2;
         // n.wi over the masked sum is at most 1 / alpha
         ((alpha2 / (t * t)) * (0.5 / self.alpha)).max(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normals_within_a_pixel_widen_the_highlight() {
+        let lobe = GgxLobe::new(0.3, 0.5);
+        assert_eq!(lobe.widened(0.0), lobe);
+        // What is small is ignored, and there is no step beyond
+        let alpha2 = 0.3f32 * 0.3 * 0.3 * 0.3;
+        let least = 0.5 * alpha2 * UNSEEN;
+        assert_eq!(lobe.widened(least * 0.999), lobe);
+        assert!((lobe.widened(least * 1.001).alpha - lobe.alpha).abs() < 1e-5);
+        // alpha^2 + 2 s^2
+        let wide = lobe.widened(0.02);
+        assert!((wide.alpha * wide.alpha - (alpha2 + 0.04)).abs() < alpha2 * 0.02, "{}", wide.alpha);
+        assert_eq!(wide.grazing, lobe.grazing);
+        // Toksvig's limit: normals that cancel each other leave a rough surface
+        for variance in [0.5, 1e3, 1e30, f32::INFINITY] {
+            assert_eq!(lobe.widened(variance).alpha, 1.0);
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! Metals and dielectrics of some roughness: the material of glTF.
 
 use super::{
-    Ambient, Bsdf, Clearcoat, Colors, GgxLobe, Lobe, Material, MaterialCommonDesc, PerMoment, Reflection, ViewGeometry,
+    Ambient, Bsdf, Clearcoat, Colors, GgxLobe, Lobe, Material, MaterialCommonDesc, NormalMapping, PerMoment,
+    Reflection, ViewGeometry,
 };
 use crate::color::Rgb;
 use crate::context::CompileContext;
@@ -50,6 +51,10 @@ table! {
         pub clearcoat: NumberParam = NumberParam::constant(0.0),
         /// The roughness of the clear coat, 0 to 1.
         pub clearcoat_roughness: NumberParam = NumberParam::constant(0.0),
+        /// The name of a normal map of the clear coat. `normal_map` and `bump_map` do not bend its normals.
+        pub clearcoat_normal_map: Option<String> = None,
+        /// Multiplies x and y of the normal map of the clear coat: -10000 to 10000.
+        pub clearcoat_normal_scale: f64 = 1.0,
         ..common: MaterialCommonDesc,
     }
 }
@@ -85,7 +90,9 @@ impl MetallicRoughnessDesc {
             [("clearcoat", &self.clearcoat), ("clearcoat_roughness", &self.clearcoat_roughness)]
                 .map(|(field, of)| unit(cx, field, of));
         let has_coat = self.clearcoat != NumberParam::constant(0.0);
-        let coat = has_coat.then_some(Clearcoat { strength, roughness: roughness_of_coat });
+        let map = ("clearcoat_normal_map", self.clearcoat_normal_map.as_deref());
+        let normals = NormalMapping::of_map(cx, params, map, ("clearcoat_normal_scale", self.clearcoat_normal_scale));
+        let coat = has_coat.then_some(Clearcoat { strength, roughness: roughness_of_coat, normals });
         let base_color = params.color(cx, "base_color", &self.base_color);
         let specular_color = params.color(cx, "specular_color", &self.specular_color);
         let f0 = f0 * f0;
@@ -106,6 +113,7 @@ impl MetallicRoughness {
         color: impl Fn(&Param<Rgb>) -> Rgb,
         number: impl Fn(&Param<f32>) -> f32,
         ambient: Option<(&Ambient, ViewGeometry)>,
+        slope_variance: f32,
     ) -> Bsdf {
         let unit = |param: &Param<f32>| number(param).clamp(0.0, 1.0);
         let (base_color, metallic, specular) = (color(&self.base_color), unit(&self.metallic), unit(&self.specular));
@@ -114,13 +122,18 @@ impl MetallicRoughness {
         let colors = self.colors(base_color, metallic, specular, dielectric);
         // The base receives 1 - max F = (1 - max f0) (1 - grazing w)
         let grazing = if strongest < 1.0 { (specular - strongest) / (1.0 - strongest) } else { 0.0 };
-        let lobe = GgxLobe::new(unit(&self.roughness), grazing.clamp(0.0, 1.0));
+        let lobe = GgxLobe::new(unit(&self.roughness), grazing.clamp(0.0, 1.0)).widened(slope_variance);
         let ambient = ambient.map_or(Rgb::BLACK, |(ambient, view)| {
             let [diffuse, f0, f90] = colors.0;
             let [near, grazing] = lobe.white_albedo(view.cos_o());
             ambient.answer(&view, diffuse, f0 * near + f90 * grazing) * unit(&self.occlusion)
         });
         Bsdf { colors, ambient, lobe: Lobe::Ggx(lobe) }
+    }
+
+    /// Whether its highlight is the same where the slopes of normals vary by no more than this.
+    pub(super) fn ignores(&self, slope_variance: f32) -> bool {
+        self.roughness.texture.is_none() && GgxLobe::new(self.roughness.factor, 0.0).ignores(slope_variance)
     }
 
     /// What the base, f0 and f90 are worth.

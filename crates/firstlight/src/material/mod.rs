@@ -12,6 +12,7 @@ mod highlight;
 mod lobe_lanes;
 mod metallic_roughness;
 mod moments;
+mod normal_mapping;
 mod phong;
 mod shading_point;
 mod unlit;
@@ -20,8 +21,8 @@ pub use alpha::{Alpha, AlphaMode};
 pub(crate) use ambient::ViewGeometry;
 pub use ambient::{Ambient, AmbientDesc, AmbientGradientDesc};
 pub use blinn_phong::{BlinnPhongDesc, BlinnPhongLobe};
-pub(crate) use bsdf::LOBE_NUMBERS;
 pub use bsdf::{Bsdf, Lobe, LobeKind};
+pub(crate) use bsdf::{LOBE_NUMBERS, MeanLobe};
 pub use classic::Classic;
 pub use clearcoat::Clearcoat;
 pub use common::{MaterialCommon, MaterialCommonDesc};
@@ -30,6 +31,7 @@ pub(crate) use highlight::Highlight;
 pub(crate) use lobe_lanes::LobeLanes;
 pub use metallic_roughness::{MetallicRoughness, MetallicRoughnessDesc};
 pub(crate) use moments::{Colors, LightTerm, MOMENTS, Moments, PARTS, PerMoment};
+pub use normal_mapping::{NormalFix, NormalMapping};
 pub use phong::{PhongDesc, PhongLobe};
 pub(crate) use shading_point::ShadingPoint;
 pub use unlit::UnlitDesc;
@@ -99,7 +101,9 @@ impl Material {
     pub fn bsdf(&self, si: &SurfaceInteraction, textures: &[Texture], ambient: &Ambient) -> Bsdf {
         let ambient = self.varies_with_view(ambient).then_some((ambient, ViewGeometry { ns: si.ns, wo: si.wo }));
         let color = |param: &Param<Rgb>| param.color(si, textures) * si.color;
-        let bsdf = self.evaluate(color, |param| param.number(si, textures, 1.0), ambient);
+        // Data is filtered over the pixel's footprint, so that a lobe hardly varies within a pixel
+        let number = |param: &Param<f32>| param.number(si, textures, si.footprints_per_pixel);
+        let bsdf = self.evaluate(color, number, ambient, si.slope_variance);
         match self.coat_reflectance(si, textures) {
             None => bsdf,
             Some(reflected) => bsdf.weighted(1.0 - reflected),
@@ -109,16 +113,22 @@ impl Material {
     /// The clear coat at a surface, which is lit beside what is [below it](Self::bsdf).
     pub fn coat_bsdf(&self, si: &SurfaceInteraction, textures: &[Texture], ambient: &Ambient) -> Option<Bsdf> {
         let Reflection::MetallicRoughness(material) = &self.reflection else { return None };
-        let number = |param: &Param<f32>| param.number(si, textures, 1.0);
+        let number = |param: &Param<f32>| param.number(si, textures, si.footprints_per_pixel);
         let occlusion = number(&material.occlusion).clamp(0.0, 1.0);
-        Some(material.coat?.evaluate(ambient, &ViewGeometry { ns: si.ns, wo: si.wo }, occlusion, number))
+        Some(material.coat?.evaluate(
+            ambient,
+            &ViewGeometry { ns: si.coat_ns, wo: si.wo },
+            occlusion,
+            si.coat_slope_variance,
+            number,
+        ))
     }
 
     /// The part of light that the clear coat reflects towards the viewer, and takes from what is below it.
     fn coat_reflectance(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Option<f32> {
         let coat = self.coat()?;
-        let view = ViewGeometry { ns: si.ns, wo: si.wo };
-        Some(coat.reflectance(&view, |param| param.number(si, textures, 1.0)))
+        let view = ViewGeometry { ns: si.coat_ns, wo: si.wo };
+        Some(coat.reflectance(&view, |param| param.number(si, textures, si.footprints_per_pixel)))
     }
 
     /// Its clear coat.
@@ -133,21 +143,22 @@ impl Material {
     /// The same on any surface, if it is the same on all.
     pub(crate) fn plain_bsdf(&self, ambient: &Ambient) -> Option<Bsdf> {
         let is_plain = self.may_be_even(ambient) && self.textures().all(|texture| texture.is_none());
-        is_plain.then(|| self.evaluate(|param| param.factor, |param| param.factor, None))
+        is_plain.then(|| self.evaluate(|param| param.factor, |param| param.factor, None, 0.0))
     }
 
     /// The material in numbers, from the values of its parameters. `ambient`: the light to which the answer varies with
-    /// the directions at the surface, if it does.
+    /// the directions at the surface, if it does. `slope_variance`: see [`SurfaceInteraction`].
     #[inline(always)]
     fn evaluate(
         &self,
         color: impl Fn(&Param<Rgb>) -> Rgb,
         number: impl Fn(&Param<f32>) -> f32,
         ambient: Option<(&Ambient, ViewGeometry)>,
+        slope_variance: f32,
     ) -> Bsdf {
         match &self.reflection {
-            Reflection::Classic(classic) => classic.evaluate(color, number, ambient),
-            Reflection::MetallicRoughness(material) => material.evaluate(color, number, ambient),
+            Reflection::Classic(classic) => classic.evaluate(color, number, ambient, slope_variance),
+            Reflection::MetallicRoughness(material) => material.evaluate(color, number, ambient, slope_variance),
             Reflection::Unlit(_) => unlit::UNLIT,
         }
     }
@@ -162,6 +173,70 @@ impl Material {
         match &self.reflection {
             Reflection::Unlit(radiance) => radiance.color(si, textures) * si.color + emissive,
             _ => emissive * (1.0 - self.coat_reflectance(si, textures).unwrap_or(0.0)),
+        }
+    }
+
+    /// Whether shading normals are bent by its maps, raised, or filtered.
+    pub(crate) fn refines_normals(&self) -> bool {
+        let common = &self.common;
+        let is_filtered = || common.specular_antialiasing || common.normal_fix == NormalFix::Raise;
+        self.is_mapped() || matches!(self.reflection, Reflection::MetallicRoughness(_)) && is_filtered()
+    }
+
+    /// Whether maps bend its shading normals, or those of its coat.
+    pub(crate) fn is_mapped(&self) -> bool {
+        self.common.normals.is_some() || self.coat_normals().is_some()
+    }
+
+    /// What bends the shading normals of its coat.
+    pub(crate) fn coat_normals(&self) -> Option<&NormalMapping> {
+        self.coat()?.normals.as_ref()
+    }
+
+    /// Whether its highlight is the same where the slopes of normals vary by no more than this.
+    pub(crate) fn ignores(&self, slope_variance: f32) -> bool {
+        match &self.reflection {
+            Reflection::MetallicRoughness(material) => material.ignores(slope_variance),
+            // Filtered under maps only
+            Reflection::Classic(_) | Reflection::Unlit(_) => self.common.normals.is_none(),
+        }
+    }
+
+    /// Whether the width of its highlight is that of a texture.
+    pub(crate) fn has_lobe_texture(&self) -> bool {
+        match &self.reflection {
+            Reflection::Classic(classic) => classic.shininess.texture.is_some(),
+            Reflection::MetallicRoughness(material) => material.roughness.texture.is_some(),
+            Reflection::Unlit(_) => false,
+        }
+    }
+
+    /// Whether all that varies over a surface are numbers, and the width of its highlight may be one of them.
+    pub(crate) fn varies_by_data(&self) -> bool {
+        let has_colors = match &self.reflection {
+            Reflection::Classic(classic) => classic.textures()[..3].iter().any(Option::is_some),
+            Reflection::MetallicRoughness(material) => material.textures()[..2].iter().any(Option::is_some),
+            Reflection::Unlit(_) => true,
+        };
+        let is_lobe = self.has_lobe_texture() || self.refines_normals();
+        is_lobe && !has_colors && self.is_one_bsdf() && !self.is_mapped()
+    }
+
+    /// Whether textures drive numbers of it.
+    pub(crate) fn has_data(&self) -> bool {
+        match &self.reflection {
+            Reflection::Classic(classic) => classic.shininess.texture.is_some(),
+            Reflection::MetallicRoughness(material) => material.textures()[2..].iter().any(Option::is_some),
+            Reflection::Unlit(_) => false,
+        }
+    }
+
+    /// Whether it may have a highlight.
+    pub(crate) fn has_lobe(&self) -> bool {
+        match &self.reflection {
+            Reflection::Classic(classic) => !classic.specular.factor.is_black(),
+            Reflection::MetallicRoughness(_) => true,
+            Reflection::Unlit(_) => false,
         }
     }
 
@@ -204,7 +279,9 @@ impl Material {
     pub(crate) fn roughness(&self, si: &SurfaceInteraction, textures: &[Texture]) -> f32 {
         match &self.reflection {
             Reflection::Classic(classic) => classic.roughness(si, textures),
-            Reflection::MetallicRoughness(material) => material.roughness.number(si, textures, 1.0).clamp(0.0, 1.0),
+            Reflection::MetallicRoughness(material) => {
+                material.roughness.number(si, textures, si.footprints_per_pixel).clamp(0.0, 1.0)
+            }
             Reflection::Unlit(_) => 1.0,
         }
     }
@@ -212,7 +289,9 @@ impl Material {
     /// How much of a metal it is, 0 to 1.
     pub(crate) fn metallic(&self, si: &SurfaceInteraction, textures: &[Texture]) -> f32 {
         match &self.reflection {
-            Reflection::MetallicRoughness(material) => material.metallic.number(si, textures, 1.0).clamp(0.0, 1.0),
+            Reflection::MetallicRoughness(material) => {
+                material.metallic.number(si, textures, si.footprints_per_pixel).clamp(0.0, 1.0)
+            }
             Reflection::Classic(_) | Reflection::Unlit(_) => 0.0,
         }
     }

@@ -76,6 +76,11 @@ impl ShadingPoint {
         ShadingPoint { horizon, ng, facet, surface, receives_shadow, base, ..point }
     }
 
+    /// The same of the clear coat, which has a normal of its own.
+    pub fn of_coat(si: &SurfaceInteraction, bsdf: &Bsdf, ambient: &Ambient) -> ShadingPoint {
+        ShadingPoint { ns: si.coat_ns, ..ShadingPoint::of(si, bsdf, ambient) }
+    }
+
     /// Whether the closed form is given up where it costs too much.
     pub fn is_bounded(&self) -> bool {
         self.closed_form_budget < f32::INFINITY

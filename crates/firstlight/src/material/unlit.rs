@@ -26,7 +26,12 @@ table! {
 impl UnlitDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext, params: &mut impl Params) -> Material {
         let color = params.radiance(cx, "color", &self.color);
-        Material { reflection: Reflection::Unlit(color), common: self.common.compile(cx, params) }
+        let mut common = self.common.compile(cx, params);
+        if common.normals.take().is_some() {
+            let message = "a normal map or bump map changes nothing of what is unlit";
+            cx.advise("", message, Some("take it out, or use a material that light falls on"));
+        }
+        Material { reflection: Reflection::Unlit(color), common }
     }
 }
 

@@ -16,6 +16,7 @@
 
 mod mesh_shadows;
 mod penumbra_grid;
+mod pixel_corners;
 mod primary;
 
 use std::iter;
@@ -37,11 +38,12 @@ use crate::film::tile::Tile;
 use crate::film::{AaMode, Heat};
 use crate::image::Buffer;
 use crate::integrate::TOLERANCE;
-use crate::material::{Bsdf, Colors, LightTerm, Moments, PARTS};
+use crate::material::{Bsdf, Colors, LightTerm, Lobe, Moments, PARTS};
 use crate::math::Ray;
 use crate::scene::{LayerStack, Scene};
 use crate::visibility::Visibility;
 use mesh_shadows::MeshShadows;
+use pixel_corners::PixelCorners;
 
 /// Pixels across a cell.
 pub(crate) const CELL: u32 = 32;
@@ -98,6 +100,7 @@ pub(crate) struct CellRenderer<'a> {
     blocks: Vec<SurfaceBlock>,
     /// The materials of the pixels of textured blocks.
     means: Vec<Option<MeanBsdf>>,
+    corners: PixelCorners,
     /// The pixels with fragments, and their light, pixel by pixel, light by light, for a few lights; none for many.
     pixels: Vec<Pixel>,
     terms: Vec<LightTerm>,
@@ -132,6 +135,7 @@ impl<'a> CellRenderer<'a> {
             sums: TermSums::new(scene, PIXELS, buffers),
             blocks: Vec::new(),
             means: Vec::new(),
+            corners: PixelCorners::default(),
             pixels: Vec::new(),
             terms: Vec::new(),
             few,
@@ -185,6 +189,7 @@ impl<'a> CellRenderer<'a> {
         self.sums.work.fill(0.0);
         self.blocks.clear();
         self.means.clear();
+        self.corners.begin();
         self.pixels.clear();
         self.terms.clear();
         self.grid.begin(corner);
@@ -281,8 +286,10 @@ impl<'a> CellRenderer<'a> {
             }
         }
         for at in self.cell_pixels() {
-            let (shape, block) = match self.states[self.index(at)] {
+            let state = self.states[self.index(at)];
+            let (shape, block) = match state {
                 PixelState::Done | PixelState::Traced => continue,
+                PixelState::Only(shape) if self.add_varied(at, shape, counts) => continue,
                 PixelState::Only(shape) => (shape, None),
                 PixelState::Block(block) => {
                     let block = self.blocks[block as usize];
@@ -435,8 +442,9 @@ impl<'a> CellRenderer<'a> {
             (ShadingRate::Fragment, [center]) => {
                 // A light that is seen from all of the fragment varies with the direction to it
                 let is_nearly_uniform = || {
-                    center.turn <= TOLERANCE.middle_turn
-                        && self.bend(fragment, light, center, center.turned()) <= TOLERANCE.middle_bend
+                    let is_ggx = matches!(fragment.mean.bsdf.lobe, Lobe::Ggx(_));
+                    center.turn <= if is_ggx { TOLERANCE.ggx_turn } else { TOLERANCE.middle_turn }
+                        && self.bend(fragment, light, center, [center.turned(), 0.0]) <= TOLERANCE.middle_bend
                 };
                 let is_dark = center.moments == Moments::ZERO;
                 center.moments.is_known()
@@ -446,13 +454,23 @@ impl<'a> CellRenderer<'a> {
         }
     }
 
-    /// The display steps that such a part of all that a light can send makes at a shading point of a fragment.
-    fn bend(&self, fragment: &Fragment, light: u32, estimate: &LightEstimate, part: f32) -> f32 {
-        let bend = part * estimate.most;
+    /// The display steps that such parts of all that a light can send make at a shading point of a fragment: by its
+    /// rotation, and by discontinuous derivatives.
+    fn bend(&self, fragment: &Fragment, light: u32, estimate: &LightEstimate, [turned, kink]: [f32; 2]) -> f32 {
+        let bend = (turned + kink) * estimate.most;
         let bsdf = &fragment.mean.bsdf;
+        let highlight = match bsdf.lobe {
+            // The second derivative of D is at most 4 D / alpha^2, so the farthest ray is off by a part `turned`; the
+            // mean over a square is by a third of that, and a little more by masking
+            Lobe::Ggx(_) if estimate.turn <= TOLERANCE.ggx_turn => {
+                let here = estimate.moments.0[1].max(estimate.moments.0[2]);
+                0.5 * turned * here + kink * estimate.most * bsdf.lobe.most()
+            }
+            _ => bend * bsdf.lobe.most(),
+        };
         let colors = self.lights.scale(light as usize) * bsdf.colors;
         let value = colors.onto(bsdf.base(&self.scene.ambient), &estimate.moments);
-        self.lights.steps(value, colors.of(&Moments::bounds(bend, bend * bsdf.lobe.most())))
+        self.lights.steps(value, colors.of(&Moments::bounds(bend, highlight)))
     }
 
     /// Whether a light varies little enough over the quadrants of a fragment.
@@ -462,7 +480,8 @@ impl<'a> CellRenderer<'a> {
         }
         let bends = |estimate: &LightEstimate| {
             let turned = if estimate.moments == Moments::ZERO { 0.0 } else { estimate.turned() };
-            self.bend(fragment, light, estimate, turned + estimate.kink()) * fragment.share > TOLERANCE.quadrant_bend
+            let parts = [turned, estimate.kink()];
+            self.bend(fragment, light, estimate, parts) * fragment.share > TOLERANCE.quadrant_bend
         };
         if estimates.iter().any(bends) {
             return false;
@@ -547,8 +566,9 @@ impl<'a> CellRenderer<'a> {
     fn trace_rays(&mut self, fragment: usize, counts: &mut Counts) {
         if self.fragments.all[fragment].rays.is_empty() {
             let pixel = self.pixel_of(fragment);
-            let rays = self.pixel_rays.of(self.scene, self.at(pixel));
-            self.fragments.trace(self.scene, fragment, rays);
+            let at = self.at(pixel);
+            let rays = self.pixel_rays.of(self.scene, at);
+            self.fragments.trace(self.scene, fragment, at, rays);
             let count = self.fragments.all[fragment].count;
             self.sums.work[pixel] += count as f32;
             counts.looks += u64::from(count);

@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use super::visible_shape::{MeanBsdf, VisibleShape};
+use crate::film::hits::camera_ray;
 use crate::ids::SurfaceId;
 use crate::integrate::TOLERANCE;
 use crate::material::{Bsdf, Colors, ShadingPoint};
@@ -57,6 +58,11 @@ pub(crate) struct Fragment {
     pub rays: Range<usize>,
 }
 
+/// The centers of the quadrants of a pixel.
+fn quadrant_centers() -> [[f32; 2]; 4] {
+    [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]]
+}
+
 /// The fragments of a cell.
 pub(crate) struct Fragments {
     /// The materials without textures.
@@ -104,15 +110,16 @@ impl Fragments {
         self.parts.clear();
     }
 
-    /// The material of a shape, if that has no textures.
+    /// The material of a shape, if that has no textures, and no highlight that its curvature changes.
     pub fn plain_bsdf(&self, scene: &Scene, shape: VisibleShape) -> Option<Bsdf> {
         if let VisibleShape::Facet(facet) = shape
             && scene.geometry.has_colors(facet)
         {
             return None;
         }
-        let surface = scene.geometry.surfaces.get(shape.surface(scene).index())?;
-        self.plain[surface.material?.index()]
+        let material = scene.geometry.surfaces.get(shape.surface(scene).index())?.material?;
+        let is_filtered = matches!(shape, VisibleShape::Sphere(_)) && scene.geometry.rules.refines(material);
+        self.plain[material.index()].filter(|_| !is_filtered)
     }
 
     /// The shading points of a rate.
@@ -197,27 +204,9 @@ impl Fragments {
     /// pixel has to be traced.
     pub fn add_whole(&mut self, scene: &Scene, pixel: u32, [i, j]: [u32; 2], shape: VisibleShape, bsdf: Bsdf) -> bool {
         let n = scene.antialiasing;
-        if n % 2 == 1 || (n * n) as usize <= FEW_RAYS {
-            return false;
-        }
         let first = self.points.len();
-        for [x, y] in [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]] {
-            let (ray, _) = scene.camera.local_ray(i as f32 + x, j as f32 + y, 1.0);
-            let Some(t) = shape.intersect(scene, &ray) else {
-                self.points.truncate(first);
-                return false;
-            };
-            self.points.push(shape.point(scene, &ray, t, &bsdf));
-        }
-        let points = &mut self.points[first..];
-        // The distance from the center of a quadrant to its farthest ray, as a part of that to the opposite center
-        let part = 0.5 - 1.0 / n as f32;
-        let apart = |one: usize, other: usize| (points[one].p - points[other].p).length();
-        let reach = part * apart(0, 3).max(apart(1, 2));
-        let turn = reach * shape.curvature(scene);
-        for point in points {
-            *point = ShadingPoint { reach, turn, most_motion: TOLERANCE.motion, closed_form_budget: 0.25, ..*point };
-            self.parts.push((n * n / 4, Colors::BLACK));
+        if !self.push_quadrants(scene, [i, j], shape, &bsdf) {
+            return false;
         }
         self.all.push(Fragment {
             pixel,
@@ -234,17 +223,113 @@ impl Fragments {
         true
     }
 
+    /// Adds the centers of the quadrants of a pixel that provably sees one shape, with one material; `false` if there
+    /// are none.
+    fn push_quadrants(&mut self, scene: &Scene, [i, j]: [u32; 2], shape: VisibleShape, bsdf: &Bsdf) -> bool {
+        let n = scene.antialiasing;
+        if n % 2 == 1 || (n * n) as usize <= FEW_RAYS {
+            return false;
+        }
+        let first = self.points.len();
+        for [x, y] in quadrant_centers() {
+            let (ray, _) = scene.camera.local_ray(i as f32 + x, j as f32 + y, 1.0);
+            let Some(t) = shape.intersect(scene, &ray) else {
+                self.points.truncate(first);
+                return false;
+            };
+            self.points.push(shape.point(scene, &ray, t, bsdf));
+        }
+        let points = &mut self.points[first..];
+        // The distance from the center of a quadrant to its farthest ray, as a part of that to the opposite center
+        let part = 0.5 - 1.0 / n as f32;
+        let apart = |one: usize, other: usize| (points[one].p - points[other].p).length();
+        let reach = part * apart(0, 3).max(apart(1, 2));
+        let turn = reach * shape.curvature(scene);
+        for point in points {
+            *point = ShadingPoint { reach, turn, most_motion: TOLERANCE.motion, closed_form_budget: 0.25, ..*point };
+            self.parts.push((n * n / 4, Colors::BLACK));
+        }
+        true
+    }
+
+    /// Adds a pixel that provably sees one shape, by its center, with the mean material; `corners` are the points of
+    /// the shape at the corners of the pixel. `false` if the pixel has to be traced.
+    pub fn add_whole_center(
+        &mut self,
+        scene: &Scene,
+        pixel: u32,
+        [i, j]: [u32; 2],
+        shape: VisibleShape,
+        mean: MeanBsdf,
+        corners: [Vec3; 4],
+    ) -> bool {
+        let n = scene.antialiasing;
+        let (ray, _) = scene.camera.local_ray(i as f32 + 0.5, j as f32 + 0.5, 1.0);
+        let Some(t) = shape.intersect(scene, &ray) else { return false };
+        if (n * n) as usize <= FEW_RAYS {
+            return false;
+        }
+        let center = shape.point(scene, &ray, t, &mean.bsdf);
+        let reach = corners.into_iter().fold(0.0f32, |reach, corner| reach.max((corner - center.p).length()));
+        let turn = reach * shape.curvature(scene);
+        let first = self.points.len();
+        // It is used only where the light is proved to vary little
+        self.points.push(ShadingPoint { reach, turn, most_motion: -1.0, ..center });
+        self.parts.push((n * n, Colors::BLACK));
+        self.all.push(Fragment {
+            pixel,
+            shape: Some(shape),
+            surface: shape.surface(scene),
+            mean,
+            count: n * n,
+            share: 1.0,
+            is_layered: false,
+            center: first..first + 1,
+            quadrants: None,
+            rays: 0..0,
+        });
+        true
+    }
+
+    /// The same by the centers of its quadrants, each with the material there.
+    pub fn add_whole_quadrants(
+        &mut self,
+        scene: &Scene,
+        pixel: u32,
+        at: [u32; 2],
+        shape: VisibleShape,
+        mean: MeanBsdf,
+    ) -> bool {
+        if !self.add_whole(scene, pixel, at, shape, mean.bsdf) {
+            return false;
+        }
+        let Some(Fragment { mean: own, quadrants, .. }) = self.all.last_mut() else { return false };
+        *own = mean;
+        for (point, [x, y]) in quadrants.clone().unwrap_or_default().zip(quadrant_centers()) {
+            let step = 1.0 / scene.antialiasing as f32;
+            let (ray, differential) = scene.camera.local_ray(at[0] as f32 + x, at[1] as f32 + y, step);
+            if let Some(t) = shape.intersect(scene, &ray) {
+                self.points[point].bsdf = shape.bsdf(scene, &ray, t, &differential);
+            }
+        }
+        true
+    }
+
     /// Computes the shading points of the rays of a fragment that was [added whole](Self::add_whole). Rays that miss it
     /// by a rounding get the point of the last one that does not.
-    pub fn trace(&mut self, scene: &Scene, fragment: usize, rays: &[Ray]) {
+    pub fn trace(&mut self, scene: &Scene, fragment: usize, [i, j]: [u32; 2], rays: &[Ray]) {
         let n = scene.antialiasing;
         let first = self.rays.len();
         let Fragment { shape, mean, .. } = &mut self.all[fragment];
         let shape = shape.expect("fragments in the trees are traced at once");
-        for (k, ray) in rays.iter().enumerate() {
+        for (k, ray) in (0..).zip(rays) {
             if let Some(t) = shape.intersect(scene, ray) {
-                self.rays.push(shape.point(scene, ray, t, &mean.bsdf));
-                self.at.push([k as u32 % n, k as u32 / n].map(|at| at as u16));
+                let bsdf = match mean.is_constant {
+                    true => mean.bsdf,
+                    false => shape.bsdf(scene, ray, t, &camera_ray(scene, i * n + k % n, j * n + k / n).1),
+                };
+                self.rays.push(shape.point(scene, ray, t, &bsdf));
+                self.at.push([k % n, k / n].map(|at| at as u16));
             }
         }
         if let Some(last) = self.rays[first..].last().copied() {
@@ -262,7 +347,10 @@ impl Fragments {
     pub fn find_quadrants(&mut self, scene: &Scene, fragment: usize, pixel: [u32; 2]) {
         if self.all[fragment].quadrants.is_none() {
             let first = self.points.len();
-            if self.add_quadrants(scene, fragment, pixel).is_none() {
+            let Fragment { shape, mean, ref rays, .. } = self.all[fragment];
+            if let Some(shape) = shape.filter(|_| rays.is_empty()) {
+                self.push_quadrants(scene, pixel, shape, &mean.bsdf);
+            } else if self.add_quadrants(scene, fragment, pixel).is_none() {
                 self.points.truncate(first);
                 self.parts.truncate(first);
             }
@@ -273,7 +361,7 @@ impl Fragments {
     fn add_quadrants(&mut self, scene: &Scene, fragment: usize, pixel: [u32; 2]) -> Option<()> {
         let Fragment { shape, mean, ref rays, share, .. } = self.all[fragment];
         let rays = rays.clone();
-        if mean.lobes_differ || rays.len() <= FEW_RAYS {
+        if rays.len() <= FEW_RAYS {
             return None;
         }
         let half = scene.antialiasing.div_ceil(2) as u16;
@@ -287,6 +375,9 @@ impl Fragments {
                 true => mean,
                 false => MeanBsdf::of(own.clone().map(|ray| self.rays[ray].bsdf))?,
             };
+            if mean.lobes_differ {
+                return None;
+            }
             let point = self.center(scene, pixel, shape, &mean.bsdf, own)?;
             let closed_form_budget = count as f32 / rays.len() as f32;
             self.points.push(ShadingPoint { share, most_motion: TOLERANCE.motion, closed_form_budget, ..point });

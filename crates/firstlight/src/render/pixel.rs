@@ -1,6 +1,7 @@
 //! One pixel of the renderers that sample every light at every camera ray: its rays, their hits, and the sum of the
 //! light there.
 
+use std::iter;
 use std::ops::ControlFlow;
 
 use super::{Counts, QUESTION_EVERY};
@@ -130,8 +131,8 @@ impl PixelSum {
     ) {
         self.terms.emission.add(scene.emission(si), weight.into());
         // Evaluate the textures of the material
-        for bsdf in [Some(scene.bsdf(si)), scene.coat_bsdf(si)].into_iter().flatten() {
-            let point = ShadingPoint::of(si, &bsdf.weighted(weight), &scene.ambient);
+        let point = ShadingPoint::of(si, &scene.bsdf(si).weighted(weight), &scene.ambient);
+        for point in iter::once(point).chain(scene.coat_point(si, weight)) {
             self.terms.ambient += point.base;
             lit(self, point);
         }

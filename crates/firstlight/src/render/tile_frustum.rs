@@ -294,6 +294,8 @@ impl TileFrustum {
             Some([near, _]) => near,
             None => self.nearest(scene, other),
         });
-        behind.all(|near| near > far + (far.abs() + near.abs()) * SLACK).then_some(one)
+        let is_only = behind.all(|near| near > far + (far.abs() + near.abs()) * SLACK);
+        // Normals that a map bends are those of no shape
+        (is_only && !scene.geometry.may_be_mapped(one.surface(scene))).then_some(one)
     }
 }

@@ -6,7 +6,7 @@ use super::square::Square;
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
 use crate::integrate::TOLERANCE;
-use crate::material::{Bsdf, Colors, ShadingPoint};
+use crate::material::{Bsdf, Colors, Lobe, MeanLobe, ShadingPoint};
 use crate::math::{DVec3, ErrorBound, Facet, Ray, Vec3};
 use crate::scene::{At, Hit, Opacity, PlacedSpot, Scene};
 use crate::shape::{Footprint, RayDifferential, SurfaceInteraction};
@@ -44,7 +44,7 @@ pub(crate) struct MeanBsdf {
     pub is_constant: bool,
     /// The largest difference of their colours, channel by channel.
     pub contrast: Colors,
-    /// Whether their lobes differ: then `bsdf` has that of the first.
+    /// Whether their lobes differ too much for one that stands for all: then `bsdf` has that of the first.
     pub lobes_differ: bool,
 }
 
@@ -54,26 +54,33 @@ impl MeanBsdf {
         MeanBsdf { bsdf, is_constant: true, contrast: Colors::BLACK, lobes_differ: false }
     }
 
+    /// Whether the widths of lobes are off their mean by no more than such a part of it.
+    pub fn spans(lobes: impl IntoIterator<Item = Lobe>, part: f32) -> bool {
+        let mut mean = MeanLobe::new(Lobe::None);
+        lobes.into_iter().for_each(|lobe| mean.add(lobe));
+        mean.mean(part).is_some()
+    }
+
     /// The mean of at least one material.
     pub fn of(mut bsdfs: impl Iterator<Item = Bsdf>) -> Option<MeanBsdf> {
         let first = bsdfs.next()?;
         let (mut sum, mut mean, mut count) = (first, MeanBsdf::constant(first), 1.0f32);
         let (mut least, mut most) = (first.colors, first.colors);
+        let mut lobes = MeanLobe::new(first.lobe);
         for bsdf in bsdfs {
             sum.colors += bsdf.colors;
             sum.ambient += bsdf.ambient;
             count += 1.0;
             (least, most) = (least.min(bsdf.colors), most.max(bsdf.colors));
             mean.is_constant &= bsdf == first;
-            // Materials without a lobe take that of the others
-            match sum.lobe.with(bsdf.lobe) {
-                Some(lobe) => sum.lobe = lobe,
-                None => mean.lobes_differ = true,
-            }
+            lobes.add(bsdf.lobe);
         }
         if !mean.is_constant {
             let part = 1.0 / count;
-            mean.bsdf = Bsdf { colors: sum.colors * part, ambient: sum.ambient * part, lobe: sum.lobe };
+            let lobe = lobes.mean(TOLERANCE.same_lobe);
+            mean.lobes_differ = lobe.is_none();
+            let lobe = lobe.unwrap_or(first.lobe);
+            mean.bsdf = Bsdf { colors: sum.colors * part, ambient: sum.ambient * part, lobe };
             mean.contrast = most + least * -1.0;
         }
         Some(mean)
@@ -242,10 +249,13 @@ impl VisibleShape {
         let material = &scene.materials[si.material.index()];
         let is_constant = growth.is_some_and(|growth| {
             let Footprint { dx, dy, edges } = si.footprint;
-            // Half a differential leads to the border
-            let part = (0.5 + 2.0 * growth).min(1.0);
+            // Half a differential leads to the border, and half a pixel beyond are data of the pixels there
+            let data = if material.has_data() { 0.5 * si.footprints_per_pixel } else { 0.0 };
+            let part = (0.5 + 2.0 * growth).min(1.0) + data;
             let grown = SurfaceInteraction { footprint: Footprint { dx: dx * part, dy: dy * part, edges }, ..si };
-            material.is_even(&grown, &scene.textures, &scene.ambient)
+            let grows = 1.0 + 2.0 * growth;
+            material.ignores(si.slope_variance * (grows * grows))
+                && material.is_even(&grown, &scene.textures, &scene.ambient)
         });
         Some(SquareBsdf { bsdf: material.bsdf(&si, &scene.textures, &scene.ambient), is_constant, growth })
     }

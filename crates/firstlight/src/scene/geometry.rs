@@ -112,6 +112,10 @@ pub(crate) struct MaterialRules {
     layered: Vec<bool>,
     /// For each material whether camera rays pass through from behind; empty if they do through none.
     single_sided: Vec<bool>,
+    /// For each material whether it bends shading normals; empty if none does.
+    mapped: Vec<bool>,
+    /// For each material whether its shading normals are bent, raised, or filtered; empty if those of none are.
+    refined: Vec<bool>,
 }
 
 impl MaterialRules {
@@ -123,7 +127,31 @@ impl MaterialRules {
         MaterialRules {
             layered: each(|material| material.common.alpha.is_some()),
             single_sided: each(|material| material.common.single_sided),
+            mapped: each(Material::is_mapped),
+            refined: each(Material::refines_normals),
         }
+    }
+
+    /// Whether a material bends shading normals.
+    #[inline(always)]
+    pub fn is_mapped(&self, material: MaterialId) -> bool {
+        self.mapped.get(material.index()).is_some_and(|is| *is)
+    }
+
+    /// Whether shading normals of surfaces of a material are bent, raised, or filtered.
+    #[inline(always)]
+    pub fn refines(&self, material: MaterialId) -> bool {
+        self.refined.get(material.index()).is_some_and(|is| *is)
+    }
+
+    /// The same of any material.
+    pub fn refines_any(&self) -> bool {
+        !self.refined.is_empty()
+    }
+
+    /// Whether any material bends shading normals.
+    pub fn has_maps(&self) -> bool {
+        !self.mapped.is_empty()
     }
 
     /// Whether surfaces of a material are layers.

@@ -14,6 +14,7 @@ mod light_spheres;
 mod links;
 mod model;
 mod motion;
+mod normals;
 mod occluders;
 mod outline;
 mod place;
@@ -52,7 +53,7 @@ use crate::describe::{ColorDesc, SamplesDesc};
 use crate::ids::SurfaceId;
 use crate::image::Buffer;
 use crate::light::Light;
-use crate::material::{Ambient, Bsdf, Material};
+use crate::material::{Ambient, Bsdf, Material, ShadingPoint};
 use crate::math::{DAffine3, DVec3};
 use crate::shape::ShadowTerminator;
 use crate::shape::SurfaceInteraction;
@@ -223,10 +224,12 @@ impl Scene {
         self.materials[si.material.index()].bsdf(si, &self.textures, &self.ambient)
     }
 
-    /// The clear coat at a surface, in numbers: it is lit beside its [material](Self::bsdf).
+    /// The shading point of the clear coat of a surface, of which such a part of a ray is seen: it is lit beside the
+    /// [material](Self::bsdf).
     #[inline(always)]
-    pub(crate) fn coat_bsdf(&self, si: &SurfaceInteraction) -> Option<Bsdf> {
-        self.materials[si.material.index()].coat_bsdf(si, &self.textures, &self.ambient)
+    pub(crate) fn coat_point(&self, si: &SurfaceInteraction, weight: f32) -> Option<ShadingPoint> {
+        let bsdf = self.materials[si.material.index()].coat_bsdf(si, &self.textures, &self.ambient)?;
+        Some(ShadingPoint::of_coat(si, &bsdf.weighted(weight), &self.ambient))
     }
 
     /// The radiance that the material at a surface emits.

@@ -244,7 +244,15 @@ pub(super) fn compile_shapes(
     // The first of a name; a second one is a fault of the text
     let group_ids = desc.groups.iter().enumerate().rev().map(|(id, (name, _))| (name.as_str(), id)).collect();
     let rules = MaterialRules::new(compiled);
+    let shapes = desc.groups.iter().flat_map(|(_, group)| &group.shapes).chain(&desc.shapes);
+    let mut of_instances = shapes.filter(|shape| matches!(shape, ShapeDesc::Instance(_)));
+    let maps_groups = rules.has_maps()
+        && of_instances.any(|instance| {
+            let material = instance.common().material.and_then(|name| materials.find(name));
+            material.is_some_and(|material| rules.is_mapped(material))
+        });
     let mut compiler = Compiler {
+        maps_groups,
         desc,
         rules: &rules,
         materials,
@@ -330,6 +338,8 @@ struct Compiler<'a, 'c> {
     files: &'a mut MeshFiles<'c>,
     solids: Vec<Solid>,
     point_sets: Vec<Arc<PointSet>>,
+    /// Whether an instance may put a normal map on what is in a group.
+    maps_groups: bool,
     /// Numbers for what surfaces say of rays.
     classes: HashMap<(RayRules, bool), u32>,
 }
@@ -339,6 +349,7 @@ impl Compiler<'_, '_> {
     fn group(&mut self, cx: &mut CompileContext, prefix: &str, shapes: &[ShapeDesc]) -> GroupSpace {
         let mut leaves: Vec<PlacedShape> = Vec::with_capacity(shapes.len());
         let mut meshes = [MeshBuilder::default(), MeshBuilder::with_copies()];
+        meshes.iter_mut().for_each(|mesh| mesh.has_tangents = self.maps_groups && !prefix.is_empty());
         // Scene order: kind by kind, in each the order of the text
         for (kind, word) in ShapeDesc::KINDS.iter().enumerate() {
             let of_kind = shapes.iter().filter(|shape| shape.kind_index() == kind);
@@ -437,6 +448,13 @@ impl Compiler<'_, '_> {
         [number, class]: [u32; 2],
         faces: Vec<MaterialId>,
     ) {
+        if faces.iter().any(|material| self.rules.is_mapped(*material)) {
+            if source.uv_set >= source.data.uvs.len() {
+                let message = "a normal map or bump map is on a mesh without texture coordinates";
+                cx.advise("material", message, Some("each triangle shows one corner of the picture"));
+            }
+            meshes.iter_mut().for_each(|mesh| mesh.has_tangents = true);
+        }
         let layered: Vec<bool> = faces.iter().map(|material| self.rules.is_layered(*material)).collect();
         let sided = |material: &MaterialId| self.rules.is_single_sided(*material);
         if faces.iter().any(|material| sided(material) != sided(&faces[0])) {

@@ -184,7 +184,7 @@ impl Scene {
         let material = surface.material.unwrap_or_else(|| self.geometry.face_material(hit));
         let receives_shadow = surface.receives_shadow;
         let surface = hit.surface;
-        SurfaceInteraction {
+        let mut si = SurfaceInteraction {
             p,
             error,
             ng,
@@ -195,12 +195,20 @@ impl Scene {
             wo,
             uv,
             footprint,
+            footprints_per_pixel: differential.steps_per_pixel,
+            slope_variance: 0.0,
+            coat_ns: ns,
+            coat_slope_variance: 0.0,
             color,
             alpha,
             surface,
             material,
             receives_shadow,
+        };
+        if self.geometry.rules.refines(material) {
+            self.refine_normal(&mut si, ray, hit, shading, differential);
         }
+        si
     }
 
     /// What the camera sees of a hit.

@@ -124,8 +124,7 @@ mod tests {
                 let hit = ball.intersect(&deep, 0.0, f64::INFINITY, false).expect("it is ahead");
                 let t = sphere.intersect(&ray).expect("it is ahead");
                 assert!((t - hit.t).abs() < 1e-6);
-                let still =
-                    RayDifferential { dx: Vec3::ZERO, dy: Vec3::ZERO, origin_dx: Vec3::ZERO, origin_dy: Vec3::ZERO };
+                let still = RayDifferential::default();
                 let (a, b) = (sphere.point(&ray, t, &still), ball.point(&deep, &hit));
                 assert!((a.uv.as_dvec2() - b.uv).length() < 1e-5, "{:?} {:?}", a.uv, b.uv);
                 assert!((a.p.as_dvec3() - b.p).length() < 1e-6);

@@ -40,6 +40,7 @@ pub use point_set::PointSetDesc;
 pub use rectangle::RectangleShapeDesc;
 pub(crate) use rectangle::facing;
 pub use sphere::{Sphere, SphereDesc, SphereUv};
+pub(crate) use surface::NormalFrame;
 pub use surface::{Footprint, RayDifferential, ShadowTerminator, SurfaceInteraction, UvEdge};
 pub use torus::TorusDesc;
 

@@ -101,6 +101,26 @@ impl Placement {
         }
     }
 
+    /// How the unit normal changes from the point of `solid` that `ray` met there with each step.
+    pub fn solid_normal_steps(
+        &self,
+        solid: &Solid,
+        hit: &SolidHit,
+        ray: &Ray,
+        differential: &RayDifferential,
+    ) -> [Vec3; 2] {
+        let unit = |n: DVec3| self.normal(n).normalize_or(DVec3::Y);
+        let at = solid.point(&self.ray(ray), hit);
+        let normal = unit(at.normal);
+        let steps = differential.on_plane(ray.d, hit.t as f32, normal.as_vec3(), f32::MAX.sqrt() * 0.5);
+        steps.map(|dp| {
+            // A point beside the surface has the normal of the one below it
+            let o = at.p + self.object_from_world.transform_vector3(dp.as_dvec3());
+            let moved = solid.point(&DRay { o, d: DVec3::ZERO }, &SolidHit { t: 0.0, ..*hit });
+            (unit(moved.normal) - normal).as_vec3()
+        })
+    }
+
     /// How the point of `solid` that `ray` met there moves with u and with v.
     pub fn solid_tangents(&self, solid: &Solid, hit: &SolidHit, ray: &Ray) -> [DVec3; 2] {
         let SolidPoint { dpdu, dpdv, .. } = solid.point(&self.ray(ray), hit);

@@ -463,6 +463,26 @@ impl PointSet {
         }
     }
 
+    /// How the unit normal changes from the point of sphere `index` that `ray` met at `t` with each step.
+    pub fn normal_steps(
+        &self,
+        placement: &Placement,
+        index: u32,
+        ray: &Ray,
+        t: f64,
+        differential: &RayDifferential,
+    ) -> [Vec3; 2] {
+        let PointBall { c, r } = self.ball(index);
+        let own = placement.ray(ray);
+        let outwards = (own.o - c + own.d * t).normalize_or(DVec3::Y);
+        let unit = |n: DVec3| placement.normal(n).normalize_or(DVec3::Y);
+        let normal = unit(outwards);
+        differential.on_plane(ray.d, t as f32, normal.as_vec3(), f32::MAX.sqrt() * 0.5).map(|dp| {
+            let moved = outwards + placement.object_from_world.transform_vector3(dp.as_dvec3()) / r;
+            (unit(moved.normalize_or(outwards)) - normal).as_vec3()
+        })
+    }
+
     /// How the point of sphere `index` that `ray` met at `t` moves with u and with v.
     pub fn tangents(&self, placement: &Placement, index: u32, ray: &Ray, t: f64) -> [DVec3; 2] {
         let PointBall { c, r } = self.ball(index);

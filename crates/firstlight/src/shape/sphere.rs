@@ -154,6 +154,13 @@ impl Sphere {
         ball_tangents(self.uv, outwards).map(|d| d * self.r)
     }
 
+    /// How the unit normal changes from the point that `ray` meets at `t` with each step.
+    pub(crate) fn normal_steps(&self, ray: &Ray, t: f64, differential: &RayDifferential) -> [Vec3; 2] {
+        let (_, _, n) = self.place(ray, t);
+        let r = self.r as f32;
+        differential.on_plane(ray.d, t as f32, n, r).map(|dp| dp / r)
+    }
+
     /// Where it is, as numbers that are the same for the same place only.
     pub(crate) fn place_bits(&self) -> [u64; 4] {
         let [x, y, z] = self.c.to_array();

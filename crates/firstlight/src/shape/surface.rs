@@ -3,7 +3,7 @@
 use crate::color::Rgb;
 use crate::describe::words;
 use crate::ids::{MaterialId, SurfaceId};
-use crate::math::{ErrorBound, Facet, LightEnd, ShadowRay, Vec2, Vec3};
+use crate::math::{DVec3, ErrorBound, Facet, LightEnd, ShadowRay, Vec2, Vec3};
 
 words! {
     /// What is made of the border of light and dark on facets with smooth normals.
@@ -38,6 +38,33 @@ pub struct Footprint {
     pub dy: Vec2,
     /// What lies beyond 0 and 1 of u and of v.
     pub edges: [UvEdge; 2],
+}
+
+/// What a normal map counts from at a point of a shape, world space.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NormalFrame {
+    /// The direction in which u runs along the surface, that of v, and the normal of the front. Of meshes these are
+    /// blended between the corners and not unit.
+    pub t: DVec3,
+    /// See `t`.
+    pub b: DVec3,
+    /// See `t`.
+    pub n: DVec3,
+    /// How the point moves with u and with v.
+    pub dp: [DVec3; 2],
+}
+
+impl NormalFrame {
+    /// The frame of a unit normal, where a point moves so with u and with v: u keeps its direction. `None` where
+    /// neither has one.
+    pub fn new(n: DVec3, dp: [DVec3; 2]) -> Option<NormalFrame> {
+        let [dpdu, dpdv] = dp;
+        let on_plane = |d: DVec3| (d - n * n.dot(d)).normalize_or_zero();
+        let side = if dpdu.cross(dpdv).dot(n) < 0.0 { -1.0 } else { 1.0 };
+        let (along_u, along_v) = (on_plane(dpdu), on_plane(dpdv));
+        let t = if along_u == DVec3::ZERO { along_v.cross(n) * side } else { along_u };
+        (t != DVec3::ZERO).then(|| NormalFrame { t, b: n.cross(t) * side, n, dp })
+    }
 }
 
 /// A point of a shape, before it is turned to the viewer.
@@ -87,6 +114,14 @@ pub struct SurfaceInteraction {
     pub uv: Vec2,
     /// The patch of texture that the camera ray stands for.
     pub footprint: Footprint,
+    /// How many times as long and as wide the patch is that a pixel stands for.
+    pub(crate) footprints_per_pixel: f32,
+    /// How much larger the variance of the slopes of microfacets is than the material says: that of the normals within
+    /// the pixel.
+    pub(crate) slope_variance: f32,
+    /// The shading normal of a clear coat, and the variance of slopes there: the maps of the material do not bend it.
+    pub(crate) coat_ns: Vec3,
+    pub(crate) coat_slope_variance: f32,
     /// Multiplies the colours of the material: linear Rec. 709.
     pub color: Rgb,
     /// Multiplies the alpha of the material: 0 to 1.
@@ -126,6 +161,8 @@ pub struct RayDifferential {
     pub origin_dx: Vec3,
     /// Of the origin, to the ray below.
     pub origin_dy: Vec3,
+    /// How many of these steps there are from one pixel to the next. The default is 0: no pixel.
+    pub steps_per_pixel: f32,
 }
 
 impl RayDifferential {
@@ -133,6 +170,14 @@ impl RayDifferential {
     #[inline(always)]
     pub(crate) fn is_zero(&self) -> bool {
         [self.dx, self.dy, self.origin_dx, self.origin_dy] == [Vec3::ZERO; 4]
+    }
+
+    /// The steps from one pixel to the next; `None` without a pixel.
+    pub(crate) fn of_pixel(&self) -> Option<RayDifferential> {
+        let RayDifferential { dx, dy, origin_dx, origin_dy, steps_per_pixel: n } = *self;
+        let is_known = n > 0.0 && !self.is_zero();
+        let [dx, dy, origin_dx, origin_dy] = [dx * n, dy * n, origin_dx * n, origin_dy * n];
+        is_known.then_some(RayDifferential { dx, dy, origin_dx, origin_dy, steps_per_pixel: 1.0 })
     }
 
     /// The steps, on the plane through the hit with normal `n`, from the point `t d` to where the neighbours meet it:

@@ -135,6 +135,19 @@ impl ImageTexture {
         self.pyramid.value(self.filter, &place, &self.beyond)
     }
 
+    /// How many texels the longer side of a footprint is that is `scale` times as large.
+    pub(super) fn texels_across(&self, uv: Vec2, footprint: &Footprint, scale: f32) -> f32 {
+        let [across, down] = self.place(uv, footprint, scale).steps;
+        across.length_squared().max(down.length_squared()).sqrt() as f32
+    }
+
+    /// The sides of a texel in u and in v.
+    pub(super) fn texel(&self) -> Vec2 {
+        let size = DVec2::from(self.pyramid.size().map(f64::from));
+        let texels = |way: DVec2| (way * size).length().max(f64::MIN_POSITIVE);
+        DVec2::new(1.0 / texels(self.turn.x_axis), 1.0 / texels(self.turn.y_axis)).as_vec2()
+    }
+
     /// Of a picture for a mask: whether it is solid at a point.
     #[allow(dead_code, reason = "materials with masks come next")]
     pub(crate) fn is_solid(&self, uv: Vec2) -> bool {

@@ -51,13 +51,35 @@ impl Texture {
     /// that is solid, in all four.
     #[inline]
     pub fn value(&self, si: &SurfaceInteraction, scale: f32) -> [f32; 4] {
+        self.around(si.uv, &si.footprint, scale)
+    }
+
+    /// The same at another texture coordinate.
+    #[inline]
+    fn around(&self, uv: Vec2, footprint: &Footprint, scale: f32) -> [f32; 4] {
         match self {
             Texture::Checkerboard(board) => {
-                let Footprint { dx, dy, edges } = si.footprint;
-                let Rgb { r, g, b } = board.color(si.uv, &Footprint { dx: dx * scale, dy: dy * scale, edges });
+                let Footprint { dx, dy, edges } = *footprint;
+                let Rgb { r, g, b } = board.color(uv, &Footprint { dx: dx * scale, dy: dy * scale, edges });
                 [r, g, b, 1.0]
             }
-            Texture::Image(image) => image.value(si.uv, &si.footprint, scale),
+            Texture::Image(image) => image.value(uv, footprint, scale),
+        }
+    }
+
+    /// How many texels the longer side of such a footprint is; 1 on what has none.
+    pub(crate) fn texels_across(&self, si: &SurfaceInteraction, scale: f32) -> f32 {
+        match self {
+            Texture::Checkerboard(_) => 1.0,
+            Texture::Image(image) => image.texels_across(si.uv, &si.footprint, scale),
+        }
+    }
+
+    /// The sides of a texel in u and in v; 0 on what has none.
+    fn texel(&self) -> Vec2 {
+        match self {
+            Texture::Checkerboard(_) => Vec2::ZERO,
+            Texture::Image(image) => image.texel(),
         }
     }
 
@@ -104,7 +126,6 @@ impl Texture {
 }
 
 /// Where the parameters of materials come from: numbers, and textures by name.
-#[allow(dead_code, reason = "materials with maps and masks come next")]
 pub(crate) trait Params {
     /// A radiance: 0 or more in each channel. What alpha its texture has does not matter to it.
     fn radiance(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb>;
@@ -114,6 +135,7 @@ pub(crate) trait Params {
 
     /// A colour whose texture's alpha says where there is anything: smaller pictures are weighted by it. The alpha of
     /// [`Texture::value`] goes with it.
+    #[allow(dead_code, reason = "no material hides what is transparent in its colour yet")]
     fn covered_color(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb>;
 
     /// A number in a range.
@@ -129,6 +151,9 @@ pub(crate) trait Params {
     /// The normal map called `texture`.
     fn normals(&mut self, cx: &mut CompileContext, field: &str, texture: &str) -> Option<TextureId>;
 }
+
+/// The least way, in u or v, over which a slope is measured: 100 times the rounding of a coordinate.
+const LEAST_REACH: f32 = 1e-5;
 
 /// A parameter of a material: the same everywhere, or a texture times a factor. `Param<Rgb>` is colour, `Param<f32>`
 /// data.
@@ -181,6 +206,26 @@ impl Param<f32> {
             None => self.factor,
             Some(id) => self.of(textures[id.index()].value(si, scale)),
         }
+    }
+
+    /// How it changes with u and with v at a surface: half a pixel's footprint, or half a texel if that is longer, to
+    /// each side, and no farther than the surface goes.
+    pub(crate) fn slopes(&self, si: &SurfaceInteraction, textures: &[Texture]) -> [f32; 2] {
+        let Some(texture) = self.texture.map(|id| &textures[id.index()]) else { return [0.0; 2] };
+        let Footprint { dx, dy, edges } = si.footprint;
+        let scale = si.footprints_per_pixel;
+        let reach = ((dx.abs() + dy.abs()) * scale).max(texture.texel()).max(Vec2::splat(LEAST_REACH)) * 0.5;
+        let number = |uv: Vec2| self.of(texture.around(uv, &si.footprint, scale));
+        let slope = |axis: usize| {
+            let (mut low, mut high) = (si.uv, si.uv);
+            (low[axis], high[axis]) = (low[axis] - reach[axis], high[axis] + reach[axis]);
+            if edges[axis] == UvEdge::Bounded {
+                (low[axis], high[axis]) = (low[axis].max(0.0), high[axis].min(1.0));
+            }
+            let way = high[axis] - low[axis];
+            if way > 0.0 { (number(high) - number(low)) / way } else { 0.0 }
+        };
+        [slope(0), slope(1)]
     }
 
     /// The number that it takes from the value of its texture.

@@ -7,6 +7,7 @@ use super::{CellRenderer, Pixel, PixelState};
 use crate::film::hits::camera_ray;
 use crate::film::resolve::PixelTerms;
 use crate::film::tile::Tile;
+use crate::integrate::TOLERANCE;
 use crate::material::{LightTerm, ShadingPoint};
 use crate::math::Ray;
 use crate::render::fragment::RayPoint;
@@ -124,10 +125,9 @@ impl CellRenderer<'_> {
         rays.extend_from_slice(self.pixel_rays.of(scene, [i, j]));
         for (k, ray) in (0..).zip(&rays) {
             let at = [k % n, k / n].map(|at| at as u16);
-            // Only textures need differentials
-            let differential = || match scene.textures.is_empty() {
-                true => RayDifferential::default(),
-                false => camera_ray(scene, i * n + k % n, j * n + k / n).1,
+            let differential = || match scene.needs_differentials() {
+                false => RayDifferential::default(),
+                true => camera_ray(scene, i * n + k % n, j * n + k / n).1,
             };
             let end = seen(self, at, ray);
             let mut left = 1.0;
@@ -137,10 +137,9 @@ impl CellRenderer<'_> {
                 left = stack.left;
                 for Layer { surface, weight, .. } in &stack.layers {
                     pixel.terms.emission.add(scene.emission(surface), f64::from(*weight));
-                    for bsdf in [Some(scene.bsdf(surface)), scene.coat_bsdf(surface)].into_iter().flatten() {
-                        let point = ShadingPoint::of(surface, &bsdf.weighted(*weight), &scene.ambient);
-                        points.push(RayPoint { shape: None, point, at, is_layered: true });
-                    }
+                    let point = ShadingPoint::of(surface, &scene.bsdf(surface).weighted(*weight), &scene.ambient);
+                    let both = iter::once(point).chain(scene.coat_point(surface, *weight));
+                    points.extend(both.map(|point| RayPoint { shape: None, point, at, is_layered: true }));
                 }
                 if left == 0.0 {
                     continue;
@@ -155,12 +154,14 @@ impl CellRenderer<'_> {
                 continue;
             }
             let mut coat = None;
+            // A shape has one normal at each point, without maps
+            let shape = shape.filter(|_| !scene.geometry.is_mapped(&hit));
             let point = match shape {
                 Some(shape) => {
                     let bsdf = self.fragments.plain_bsdf(scene, shape).unwrap_or_else(|| {
                         let si = shape.interaction(scene, ray, hit.t, &differential());
                         pixel.terms.emission.add(scene.emission(&si), left.into());
-                        coat = scene.coat_bsdf(&si);
+                        coat = scene.coat_point(&si, left);
                         scene.bsdf(&si)
                     });
                     let bsdf = bsdf.weighted(left);
@@ -169,17 +170,13 @@ impl CellRenderer<'_> {
                 None => {
                     let si = scene.local_surface(ray, &hit, &differential());
                     pixel.terms.emission.add(scene.emission(&si), left.into());
-                    coat = scene.coat_bsdf(&si);
+                    coat = scene.coat_point(&si, left);
                     ShadingPoint::of(&si, &scene.bsdf(&si).weighted(left), &scene.ambient)
                 }
             };
             let is_layered = left != 1.0 || coat.is_some();
-            points.push(RayPoint { shape, point, at, is_layered });
-            if let Some(bsdf) = coat {
-                let bsdf = bsdf.weighted(left);
-                let point = ShadingPoint { bsdf, base: bsdf.base(&scene.ambient), ..point };
-                points.push(RayPoint { shape, point, at, is_layered });
-            }
+            let both = iter::once(point).chain(coat);
+            points.extend(both.map(|point| RayPoint { shape, point, at, is_layered }));
         }
         let number = self.pixels.len() as u32;
         self.pixels.push(pixel);
@@ -195,6 +192,11 @@ impl CellRenderer<'_> {
             self.blocks.push(SurfaceBlock { square, shape, bsdf, layer: 0, means: None });
             return;
         }
+        let material = scene.geometry.surfaces[shape.surface(scene).index()].material;
+        if material.is_some_and(|material| scene.materials[material.index()].has_lobe_texture()) {
+            // Each pixel has a lobe of its own
+            return self.mark(square, PixelState::Only(shape));
+        }
         if square.side > TEXTURED {
             for quarter in square.quarters_on([scene.width, scene.height]) {
                 self.add_blocks(quarter, shape);
@@ -208,7 +210,8 @@ impl CellRenderer<'_> {
         let start = self.blocks.len();
         for (at, mean) in means {
             let MeanBsdf { bsdf, .. } = mean;
-            let is_alike = |block: &SurfaceBlock| block.bsdf.lobe.with(bsdf.lobe).is_some();
+            // A peak falls as the square of its width
+            let is_alike = |block: &SurfaceBlock| block.bsdf.lobe.is_near(bsdf.lobe, 0.5 * TOLERANCE.same_mean);
             let layer = self.blocks[start..].iter().position(is_alike).unwrap_or_else(|| {
                 let first = self.means.len();
                 self.means.resize(first + (square.side * square.side) as usize, None);

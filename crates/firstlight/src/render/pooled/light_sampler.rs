@@ -338,7 +338,8 @@ impl<'a, S: Simd> ReceiverLanes<'a, S> {
             std::array::from_fn(|lane| if is_lit(lane) { of_layers.map_or(1.0, |left| left[lane]) } else { 0.0 });
         let sending = (0..LANES).filter(|lane| samples.sends >> lane & 1 == 1);
         let (least, most) = sending.fold((1.0f32, 0.0f32), |(a, b), lane| (a.min(left[lane]), b.max(left[lane])));
-        let border = if most - least > TOLERANCE.same_left { 0.5 * (least + most) } else { 1.0 };
+        // What layers leave of a group differs by less than the error of a silhouette: none crosses it
+        let border = if most - least > TOLERANCE.silhouette_groups { 0.5 * (least + most) } else { 1.0 };
         let dimmed = (0..LANES).filter(|lane| left[*lane] < border).fold(0, |bits, lane| bits | 1 << lane);
         samples.hidden = samples.sends & dimmed;
         left

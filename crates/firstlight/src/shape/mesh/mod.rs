@@ -3,6 +3,7 @@
 //! What a ray finds on one is in [`surface`]; the tree of its triangles is in [`super::triangles`].
 
 mod surface;
+mod tangents;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -353,6 +354,8 @@ pub(crate) struct MeshBuilder {
     joined: Lists,
     /// Whether a triangle that is there twice is met twice.
     pub keeps_copies: bool,
+    /// Whether normal maps may be on it.
+    pub has_tangents: bool,
 }
 
 /// A mesh that is to be joined with others, and its part of them.
@@ -444,7 +447,8 @@ impl MeshBuilder {
 
     /// What the joined mesh follows from; `None` where that is not known.
     fn key(&self, origin: DVec3) -> Option<ContentKey> {
-        let mut parts = vec![numbers(&origin.to_array()), vec![u8::from(self.keeps_copies)]];
+        let mut parts =
+            vec![numbers(&origin.to_array()), vec![u8::from(self.keeps_copies), u8::from(self.has_tangents)]];
         for source in &self.sources {
             parts.push(source.content?.to_vec());
             parts.push(source.transform.map_or(Vec::new(), |transform| numbers(&transform.to_cols_array())));
@@ -470,7 +474,7 @@ impl MeshBuilder {
 
     fn build_anew(mut self, cx: &CompileContext, origin: DVec3) -> Option<Mesh> {
         for source in std::mem::take(&mut self.sources) {
-            self.joined.add(source, origin);
+            self.joined.add(source, origin, self.has_tangents);
         }
         let Lists { positions, triangles, normals, uvs, colors, parts, classes } = self.joined;
         if triangles.is_empty() {
@@ -489,7 +493,7 @@ impl MeshBuilder {
 }
 
 impl Lists {
-    fn add(&mut self, source: JoinedSource, origin: DVec3) {
+    fn add(&mut self, source: JoinedSource, origin: DVec3, has_tangents: bool) {
         let JoinedSource { data, uv_set, transform, surface, class, materials, numbers, .. } = source;
         let mut data = Arc::unwrap_or_clone(data);
         move_mesh(&mut data, transform, origin);
@@ -498,7 +502,12 @@ impl Lists {
         let added = positions.len();
         let own_uvs = if uv_set < uvs.len() { uvs.swap_remove(uv_set) } else { Vec::new() };
         self.classes.push(class);
+        let tangents = match has_tangents && !own_uvs.is_empty() {
+            true => tangents::tangents(&positions, &triangles, &normals, &own_uvs),
+            false => Vec::new(),
+        };
         self.parts.push(JoinedPart {
+            tangents,
             first_triangle: first as u32,
             surface,
             face_materials,

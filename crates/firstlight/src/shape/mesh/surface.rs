@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 
+use super::tangents::CornerTangents;
 use crate::color::Rgb;
 use crate::ids::MaterialId;
 use crate::math::{DVec3, ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3};
@@ -41,6 +42,8 @@ pub(crate) struct JoinedPart {
     pub numbers: Vec<u32>,
     /// Whether it has texture coordinates of its own.
     pub has_uvs: bool,
+    /// Of each triangle, where a normal map is on it; empty where none is.
+    pub tangents: Vec<CornerTangents>,
 }
 
 impl JoinedPart {
@@ -74,7 +77,7 @@ fn weights(at: TrianglePoint) -> [f64; 3] {
 
 /// What lies between what the corners have.
 #[inline(always)]
-fn blended(corners: [DVec3; 3], at: TrianglePoint) -> DVec3 {
+pub(super) fn blended(corners: [DVec3; 3], at: TrianglePoint) -> DVec3 {
     let weights = weights(at);
     corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]
 }
@@ -109,7 +112,9 @@ impl Mesh {
             + size_of_val(self.normals.as_slice())
             + size_of_val(self.uvs.as_slice())
             + size_of_val(self.colors.as_slice());
-        lists + self.parts.iter().map(|part| size_of_val(part.face_materials.as_slice())).sum::<usize>()
+        let of_part =
+            |part: &JoinedPart| size_of_val(part.face_materials.as_slice()) + size_of_val(part.tangents.as_slice());
+        lists + self.parts.iter().map(of_part).sum::<usize>()
     }
 
     /// The box around all triangles that can be hit; `None` if there are none.
