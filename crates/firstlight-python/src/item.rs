@@ -15,6 +15,7 @@ use crate::value::table;
 
 /// A thing of a scene.
 #[derive(Clone, Debug)]
+#[allow(clippy::large_enum_variant, reason = "each is read once")]
 pub enum Item {
     /// The picture.
     Render(RenderDesc),

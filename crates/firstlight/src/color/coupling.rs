@@ -151,15 +151,19 @@ mod tests {
         }
     }
 
+    fn power(x: f32, exponent: u32) -> f32 {
+        (0..exponent).fold(1.0, |product, _| product * x)
+    }
+
     /// A colour of any brightness from 0.003 to 16: gray, nearly gray, or saturated.
     fn color(random: &mut Random) -> Rgb {
-        let brightness = 0.003 * 5000.0 * random.next().powi(4) + 0.003;
-        let power = 1 + (random.next() * 5.0) as i32;
+        let brightness = 0.003 * 5000.0 * power(random.next(), 4) + 0.003;
+        let exponent = 1 + (random.next() * 5.0) as u32;
         let kind = random.next();
         let mut channel = || match kind {
             kind if kind < 0.15 => 1.0,
             kind if kind < 0.4 => 1.0 + 0.1 * (random.next() - 0.5),
-            _ => random.next().powi(power),
+            _ => power(random.next(), exponent),
         };
         Rgb::new(channel(), channel(), channel()) * brightness
     }
@@ -180,7 +184,8 @@ mod tests {
         let gray = |x: f64| Encoding::Srgb.encode(ToneMapping::Neutral.apply([x; 3])[0]);
         let mut before = f64::INFINITY;
         for i in 1..4000 {
-            let x = 1e-4 * f64::from(i) + 1e-9 * f64::from(i).powi(3);
+            let i = f64::from(i);
+            let x = 1e-4 * i + 1e-9 * (i * i * i);
             let of_curve = slope(&neutral_curve, x);
             assert!(of_curve >= slope(&gray, x) - 1e-6 && of_curve <= before * (1.0 + 1e-6), "{x}");
             before = of_curve;
@@ -198,7 +203,7 @@ mod tests {
             let steps = DisplaySteps::new(&display, 1.0);
             for _ in 0..60_000 {
                 let value = color(&mut random);
-                let size = value.r.max(value.g).max(value.b) * 0.2 * random.next().powi(4);
+                let size = value.r.max(value.g).max(value.b) * 0.2 * power(random.next(), 4);
                 let single = (random.next() * 6.0) as usize;
                 let error: [f32; 3] =
                     std::array::from_fn(|k| if single < 3 && single != k { 0.0 } else { size * random.next() });

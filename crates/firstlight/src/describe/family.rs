@@ -48,6 +48,7 @@ macro_rules! family {
     ) => {
         $(#[doc = $doc])*
         #[derive(Clone, Debug, PartialEq)]
+        #[allow(clippy::large_enum_variant, reason = "descriptions are few, and read once")]
         pub enum $family {
             $(#[doc = $doc0])*
             $variant0($desc0),
