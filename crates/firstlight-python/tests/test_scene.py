@@ -408,12 +408,15 @@ def test_stubs_have_the_fields_of_every_method():
     stubs = (pathlib.Path(fl.__file__).parent / "__init__.pyi").read_text()
     from inspect import signature
 
-    shared = set(re.findall(r"^    (\w+): ", re.search(r"class _ShapeFields.*?\n\n", stubs, re.S).group(), re.M))
+    def fields_of(kind):
+        return set(re.findall(r"^    (\w+): ", re.search(rf"class {kind}.*?\n\n", stubs, re.S).group(), re.M))
+
+    shared = {kind: fields_of(kind) for kind in ("_ShapeFields", "_MaterialFields")}
     for name in dir(fl.Scene):
         if re.fullmatch(r"add_\w+", name) and name not in ("add_mesh", "add_camera"):
             text = re.search(rf"def {name}\((.*?)\) -> Handle", stubs, re.S).group(1)
             said = {field for field in re.findall(r"^        (\w+):", text, re.M)}
-            said |= shared if "_ShapeFields" in text else set()
+            said |= set().union(*(fields for kind, fields in shared.items() if kind in text))
             assert said == set(signature(getattr(fl.Scene, name)).parameters) - {"self"}, name
 
 

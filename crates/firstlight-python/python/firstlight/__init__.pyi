@@ -387,6 +387,10 @@ class Scene:
         specular: NumberParam = ...,
         specular_color: ColorParam = ...,
         occlusion: NumberParam = ...,
+        clearcoat: NumberParam = ...,
+        clearcoat_roughness: NumberParam = ...,
+        clearcoat_normal_map: str | None = ...,
+        clearcoat_normal_scale: float = ...,
         **fields: Unpack[_MaterialFields],
     ) -> Handle: ...
     def add_unlit_material(
