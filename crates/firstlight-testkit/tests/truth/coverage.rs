@@ -162,7 +162,7 @@ fn of_one_ray_a_pixel_they_are_what_the_centre_ray_meets() {
             compared += 1;
         }
     }
-    assert_eq!(compared, 10);
+    assert_eq!(compared, 12);
 }
 
 #[test]
