@@ -202,9 +202,9 @@ fn aimed(mesh: &Mesh, from_one: bool, random: &mut Random) -> RayTile {
     tile
 }
 
-/// How many rays each mesh is asked against brute force: `FIRSTLIGHT_RAYS`, 10000 unless said.
+/// How many rays each mesh is asked against brute force: `FIRSTLIGHT_RAYS`, 4000 unless said.
 fn rays_a_mesh() -> usize {
-    std::env::var("FIRSTLIGHT_RAYS").ok().and_then(|rays| rays.parse().ok()).unwrap_or(10_000)
+    std::env::var("FIRSTLIGHT_RAYS").ok().and_then(|rays| rays.parse().ok()).unwrap_or(4_000)
 }
 
 impl Mesh {
@@ -490,7 +490,7 @@ fn what_has_no_area_or_no_place_is_left_out() {
 
 #[test]
 fn a_closed_mesh_has_no_holes() {
-    let sphere = Mesh::sphere(200);
+    let sphere = Mesh::sphere(100);
     let middle = |a: Vec3, b: Vec3| (a + b) * 0.5;
     let places = [(Vec3::ZERO, 1.0), (FAR, 1.0), (Vec3::ZERO, 1e-6), (Vec3::ZERO, 1e6)];
     for (round, (center, size)) in places.into_iter().enumerate() {
@@ -503,8 +503,8 @@ fn a_closed_mesh_has_no_holes() {
         targets.extend(mesh.triangles.iter().map(|t| middle(corner(t[0]), corner(t[1]))));
         targets.extend(mesh.triangles.iter().map(|t| middle(corner(t[1]), corner(t[2]))));
         let mut random = Random::new(round as u64);
-        // And anywhere, so that there are a million rays, or ten
-        let wanted = (rays_a_mesh() / 20).clamp(500, 5_000) * 1000;
+        // And anywhere, so that there are 400,000 rays from each place, or ten million
+        let wanted = (rays_a_mesh() / 20).clamp(200, 5_000) * 1000;
         let more = wanted.saturating_sub(targets.len());
         let mut spot = Vec3::ZERO;
         targets.extend((0..more).map(|i| {
