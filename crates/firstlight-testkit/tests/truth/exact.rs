@@ -118,8 +118,8 @@ fn shadows_whose_outlines_cross_are_told_closely() {
     assert!(off < 0.15, "{off} steps");
 }
 
-/// Renders a square of a scene's film, its light shared among camera rays and not, and compares them. Both may be off by
-/// the tolerance: where they differ by more than is allowed, rays to a quarter of it decide.
+/// Renders a square of a scene's film, its light shared among camera rays and not, and compares them. Both may be off
+/// by the tolerance: where they differ by more than is allowed, rays to a quarter of it decide.
 fn compare_part(name: &str, desc: &SceneDesc, [x, y]: [u32; 2], size: u32) {
     let desc = with_samples(desc, SamplesDesc::Exact, SampleSet::Sobol, 0);
     let scene = compile(&desc);
