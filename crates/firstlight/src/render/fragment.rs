@@ -22,7 +22,8 @@ pub(crate) struct RayPoint {
     pub point: ShadingPoint,
     /// Column and row in the pixel of the ray.
     pub at: [u16; 2],
-    /// Whether it is one of several points of its ray: a layer, what is behind one, a coat, or what is below one.
+    /// Whether the ray has several shading points: those of layers and of the surface behind them, or those of a clear
+    /// coat and of its base.
     pub is_layered: bool,
 }
 

@@ -100,7 +100,7 @@ enum Form {
 /// A group, or the scene itself, in its own space.
 struct GroupSpace {
     leaves: Vec<PlacedShape>,
-    /// All its meshes, to be joined: what of them is opaque, and what is not.
+    /// The meshes that are to be joined: first their opaque triangles, then the others.
     builders: [MeshBuilder; 2],
     /// All its meshes, joined, once it is known where they count from.
     meshes: [Option<Arc<Mesh>>; 2],

@@ -110,7 +110,7 @@ impl Scene {
         self.occluded_by_opaque(ray) || self.left_by_layers(ray) == 0.0
     }
 
-    /// Whether anything opaque stops the light. Any hit will do, so the order is of no account.
+    /// Whether an opaque surface blocks the shadow ray. Any hit decides, so occluders are tested in any order.
     #[inline]
     pub(crate) fn occluded_by_opaque(&self, ray: &ShadowRay) -> bool {
         self.occluded_by_lists(ray) || self.geometry.has_trees() && self.geometry.is_blocked(self.level, ray)

@@ -223,7 +223,7 @@ impl Geometry {
                 let owned = &self.parallelograms[i as usize];
                 let crossing = || owned.shape.crossing(ray.start.as_dvec3(), ray.l.as_dvec3());
                 self.casts(owned.surface, ray.to.light)
-                    // Its own surface, and what is coplanar with it, is told apart as for opaque ones
+                    // As with opaque parallelograms, a coplanar one does not block the ray
                     && owned.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite())
                     && veils.add(Hit { t: crossing(), surface: owned.surface, at: At::Parallelogram(i) })
             }

@@ -49,8 +49,8 @@ impl Geometry {
         self.world.is_some() || !self.items.is_empty()
     }
 
-    /// Whether any light has to be sampled past anything but what is listed: past what [has boxes](Self::has_boxes), or
-    /// is not opaque.
+    /// Whether there are occluders that closed forms do not handle: those with [boxes](Self::has_boxes), and those that
+    /// are not opaque.
     #[inline(always)]
     pub fn is_sampled_past(&self) -> bool {
         self.has_boxes() || self.layers.is_some()

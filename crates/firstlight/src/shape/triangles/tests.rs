@@ -202,7 +202,7 @@ fn aimed(mesh: &Mesh, from_one: bool, random: &mut Random) -> RayTile {
     tile
 }
 
-/// How many rays each mesh is asked against brute force: `FIRSTLIGHT_RAYS`, 4000 unless said.
+/// The number of rays for which a mesh's tree is compared with brute force: `FIRSTLIGHT_RAYS`, or 4000.
 fn rays_a_mesh() -> usize {
     std::env::var("FIRSTLIGHT_RAYS").ok().and_then(|rays| rays.parse().ok()).unwrap_or(4_000)
 }
