@@ -12,7 +12,7 @@ use super::batch::{
     Exact, FrameLanes, FrameNumber, LaneBlock, LaneNumbers, LightFrame16, Linear16, Members, light_vectors,
 };
 use super::tolerance::TOLERANCE;
-use crate::material::{LobeKind, LobeLanes};
+use crate::material::LobeKind;
 use crate::math::{LANES, sin_cos};
 
 /// Moments of a light: of the cosine, and of the lobe.
@@ -173,19 +173,20 @@ pub(super) fn sides(cells: &[Cell]) -> [LaneNumbers; 4] {
     sides
 }
 
-/// Values at the nodes: [moment][row][column].
-type NodeValues<S> = [[[f32x16<S>; NODES]; NODES]; MOMENTS];
+/// Values at the nodes: [moment][row][column]. Those of moments that a lobe does not have are left as they are.
+pub(crate) type NodeValues = [[[LaneNumbers; NODES]; NODES]; MOMENTS];
 
-/// The moments' integrands at the nodes of up to sixteen cells, and the areas of the cells. To be called within
-/// `vectorize`.
+/// Writes the moments' integrands at the nodes of up to sixteen cells, and returns the areas of the cells. To be called
+/// within `vectorize`.
 #[inline(always)]
-fn values<S: Simd>(
+fn evaluate_nodes<S: Simd>(
     simd: S,
-    lobes: &LobeLanes,
+    lobe: Option<LobeKind>,
     falloff: AreaWeight,
     members: &Members<LightFrame16>,
     cells: &[Cell],
-) -> (NodeValues<S>, f32x16<S>) {
+    values: &mut NodeValues,
+) -> f32x16<S> {
     use FrameNumber::*;
     let splat = |v: f32| simd.splat_f32x16(v);
     let [x0, x1, y0, y1] = sides(cells).map(|side| f32x16::simd_from(simd, side));
@@ -202,7 +203,7 @@ fn values<S: Simd>(
     let out = members.linear(simd, [OutC, OutX, OutY]);
     let zero = splat(0.0);
     let height2 = height * height;
-    let mut values = [[[zero; NODES]; NODES]; MOMENTS];
+    let lobes = members.lobes(simd, lobe);
     let is_sphere = falloff == AreaWeight::Sphere;
     let (ratio, behind2) = (members.lanes(simd, Ratio), members.lanes(simd, Behind2));
     // Distance along the way to the middle of a sphere, and the power of the point with respect to it
@@ -222,6 +223,7 @@ fn values<S: Simd>(
             (places[i], deep[i]) = sin_cos(places[i]);
         }
     }
+    let (mut cos_i, mut cos_io, mut weights) = ([zero; NODES], [zero; NODES], [splat(1.0); NODES]);
     for (j, node) in RULE.nodes.iter().enumerate() {
         let (mut y, mut wide) = (yh * *node + ym, splat(1.0));
         if is_sphere {
@@ -231,7 +233,6 @@ fn values<S: Simd>(
         let across = y * lb + fb;
         let rest = across * across + height2;
         let (cos_row, out_row) = (y * cos.y + cos.c, y * out.y + out.c);
-        let (mut cos_i, mut cos_io, mut weights) = ([zero; NODES], [zero; NODES], [splat(1.0); NODES]);
         for i in 0..NODES {
             let x = if is_sphere { places[i] * wide } else { places[i] };
             let along = x * la + along_row;
@@ -260,26 +261,36 @@ fn values<S: Simd>(
             cos_i[i] = (x * cos.x + cos_row) * inverse;
             cos_io[i] = (x * out.x + out_row) * inverse;
         }
-        for (values, moment) in values.iter_mut().zip(lobes.moments(cos_i, cos_o, cos_io, weights)) {
-            values[j] = moment;
-        }
+        lobes.for_each_moment(
+            cos_i,
+            cos_o,
+            cos_io,
+            weights,
+            #[inline(always)]
+            |moment, numbers| {
+                for (value, number) in values[moment][j].iter_mut().zip(numbers) {
+                    number.store_slice(value);
+                }
+            },
+        );
     }
-    (values, xh * yh * members.lanes(simd, Measure))
+    xh * yh * members.lanes(simd, Measure)
 }
 
 /// The integral of a moment over a cell, and the absolute last two Legendre coefficients along x and along y, times
 /// their number of terms.
 #[inline(always)]
-fn sum<S: Simd>(simd: S, values: &[[f32x16<S>; NODES]; NODES]) -> (f32x16<S>, [[f32x16<S>; 2]; 2]) {
+fn sum<S: Simd>(simd: S, values: &[[LaneNumbers; NODES]; NODES]) -> (f32x16<S>, [[f32x16<S>; 2]; 2]) {
     let zero = simd.splat_f32x16(0.0);
     let (mut sum, mut tails) = (zero, [[zero; 2]; 2]);
-    for (j, row) in values.iter().enumerate() {
+    for j in 0..NODES {
         let (mut total, mut c, mut d) = (zero, [zero; 2], [zero; 2]);
         for i in 0..NODES {
-            total += row[i] * RULE.weights[i];
+            let [in_row, in_column] = [values[j][i], values[i][j]].map(|value| f32x16::simd_from(simd, value));
+            total += in_row * RULE.weights[i];
             for k in 0..2 {
-                c[k] += row[i] * RULE.tails[k][i];
-                d[k] += values[i][j] * RULE.tails[k][i];
+                c[k] += in_row * RULE.tails[k][i];
+                d[k] += in_column * RULE.tails[k][i];
             }
         }
         sum += total * RULE.weights[j];
@@ -293,7 +304,8 @@ fn sum<S: Simd>(simd: S, values: &[[f32x16<S>; NODES]; NODES]) -> (f32x16<S>, [[
 
 /// Integrates up to sixteen cells. On fully visible cells the error estimate is the tail of the series times its ratio
 /// to the integral, since errors cancel at Gauss nodes; on partially visible cells they do not. With `kept`, cells are
-/// partially visible, and their antiderivatives are appended to it. To be called within `vectorize`.
+/// partially visible, and their antiderivatives are appended to it. `values` is overwritten. To be called within
+/// `vectorize`.
 #[inline(always)]
 pub(crate) fn integrate<S: Simd>(
     simd: S,
@@ -301,10 +313,10 @@ pub(crate) fn integrate<S: Simd>(
     falloff: AreaWeight,
     members: &Members<LightFrame16>,
     cells: &[Cell],
+    values: &mut NodeValues,
     kept: Option<&mut Vec<PartialCells>>,
 ) -> CellQuadrature {
-    let lobes = members.lobes(simd, lobe);
-    let (values, area) = values(simd, &lobes, falloff, members, cells);
+    let area = evaluate_nodes(simd, lobe, falloff, members, cells, values);
     let (zero, one, least) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0), simd.splat_f32x16(f32::MIN_POSITIVE));
     let mut whole_sums = CellQuadrature::default();
     let moments = LobeKind::moments(lobe);
@@ -329,7 +341,7 @@ pub(crate) fn integrate<S: Simd>(
         for (row, values) in rows.iter_mut().zip(&values[moment]) {
             for (power, matrix) in row.iter_mut().zip(&ANTIDERIVATIVE) {
                 for (value, factor) in values.iter().zip(matrix) {
-                    *power += *value * *factor;
+                    *power += f32x16::simd_from(simd, *value) * *factor;
                 }
             }
         }

@@ -20,7 +20,7 @@ use arrayvec::ArrayVec;
 use fearless_simd::{Level, Simd};
 
 use super::batch::{LaneNumbers, LightFrame16, Members};
-use super::cell::{Cell, CellQuadrature, MOMENTS, PartialCells, integrate};
+use super::cell::{Cell, CellQuadrature, MOMENTS, NodeValues, PartialCells, integrate};
 use super::classify::{LightOccluders, OcclusionClass, classify};
 use super::emitter::Emitter;
 use super::light_frame::LightFrame;
@@ -130,6 +130,7 @@ pub(crate) struct AreaLightIntegrator {
     whole_sums: Vec<CellQuadrature>,
     partial_sums: Vec<CellQuadrature>,
     panel_sums: Vec<PanelSums>,
+    nodes: NodeValues,
     next_whole: Vec<Cell>,
     next_panels: Vec<Panel>,
     spare: Vec<LaneNumbers>,
@@ -430,7 +431,7 @@ impl AreaLightIntegrator {
 
     /// Integrates all cells of this round, and splits the new partially visible ones into panels.
     fn integrate_cells(&mut self, level: Level, task: &LightTask) {
-        let Self { frames, masks, whole, partial, kept, panels, spare, .. } = self;
+        let Self { frames, masks, whole, partial, kept, panels, nodes, spare, .. } = self;
         let falloff = task.emitter.falloff();
         let light = task.occluded_light(masks);
         self.whole_sums.clear();
@@ -447,7 +448,7 @@ impl AreaLightIntegrator {
                 let wanted = is_partial.then_some(&mut *kept);
                 let fitted = simd.vectorize(
                     #[inline(always)]
-                    || integrate(simd, task.lobe, falloff, &members, cells, wanted),
+                    || integrate(simd, task.lobe, falloff, &members, cells, nodes, wanted),
                 );
                 if is_partial {
                     partial_sums.push(fitted);
@@ -570,12 +571,12 @@ impl AreaLightIntegrator {
 
 /// The numbers of the `k`-th member of a round, from its block.
 fn lane(block: &[LaneNumbers; MOMENTS], k: usize) -> [f32; MOMENTS] {
-    block.map(|numbers| numbers[k % LANES])
+    std::array::from_fn(|moment| block[moment][k % LANES])
 }
 
 /// The error estimate of the `k`-th cell along x and along y, as parts of the allowed error.
 fn fit_error(weight: Weight, whole_sums: &CellQuadrature, k: usize) -> [f32; 2] {
-    whole_sums.errors.map(|errors| weight.of(lane(&errors, k)))
+    [0, 1].map(|axis| weight.of(lane(&whole_sums.errors[axis], k)))
 }
 
 /// Added to the number of a round once the weight is computed.

@@ -264,9 +264,10 @@ pub(crate) fn integrate_rows<S: Simd>(
     let horizon = members.linear(simd, [HorizonC, HorizonX, HorizonY]);
     let origin = [members.lanes(simd, OriginX), members.lanes(simd, OriginY)];
     // The polynomials: [moment][power of x][power of y]
-    let mut powers = [[[zero; 5]; 5]; MOMENTS];
-    for (moment, powers) in powers.iter_mut().enumerate().take(moments) {
-        for (x, powers) in powers.iter_mut().enumerate() {
+    let mut powers: ArrayVec<[[f32x16<S>; 5]; 5], MOMENTS> = ArrayVec::new();
+    for moment in 0..moments {
+        powers.push([[zero; 5]; 5]);
+        for (x, powers) in powers[moment].iter_mut().enumerate() {
             for (y, power) in powers.iter_mut().enumerate() {
                 *power = cells.number(simd, PartialCells::power(moment, x, y));
             }

@@ -79,6 +79,7 @@ pub(crate) struct MeanLobe {
     /// Whether all are of its kind.
     is_one_kind: bool,
     count: f32,
+    /// Of the numbers of all; while they are the same, of one.
     sum: [f32; LOBE_NUMBERS],
     least: [f32; LOBE_NUMBERS],
     most: [f32; LOBE_NUMBERS],
@@ -101,9 +102,16 @@ impl MeanLobe {
             *self = MeanLobe::new(lobe);
             return;
         }
-        self.is_same &= lobe == self.one;
-        self.is_one_kind &= lobe.kind() == self.one.kind();
+        if self.is_same && lobe == self.one {
+            self.count += 1.0;
+            return;
+        }
+        if self.is_same {
+            self.sum = self.sum.map(|number| number * self.count);
+            self.is_same = false;
+        }
         self.count += 1.0;
+        self.is_one_kind &= lobe.kind() == self.one.kind();
         for (k, number) in lobe.numbers().into_iter().enumerate() {
             self.sum[k] += number;
             (self.least[k], self.most[k]) = (self.least[k].min(number), self.most[k].max(number));

@@ -2,7 +2,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{BlinnPhongLobe, GgxLobe, LOBE_NUMBERS, Lobe, LobeKind, MOMENTS, PhongLobe};
+use super::{BlinnPhongLobe, GgxLobe, LOBE_NUMBERS, Lobe, LobeKind, PhongLobe};
 use crate::math::{ExponentLanes, LANES};
 
 /// Lobes of one kind, lane by lane.
@@ -52,26 +52,38 @@ impl LobeLanes {
         }
     }
 
-    /// [`Lobe::moments`] in so many times sixteen lanes: the same bits.
+    /// Calls `put` with the number of each moment that the lobe has and its values: [`Lobe::moments`] in so many times
+    /// sixteen lanes, with the same bits.
     #[inline(always)]
-    pub fn moments<S: Simd, const N: usize>(
+    pub fn for_each_moment<S: Simd, const N: usize>(
         &self,
         cos_i: [f32x16<S>; N],
         cos_o: f32x16<S>,
         cos_io: [f32x16<S>; N],
         weight: [f32x16<S>; N],
-    ) -> [[f32x16<S>; N]; MOMENTS] {
-        let times = |v: [f32x16<S>; N]| std::array::from_fn(|i| v[i] * weight[i]);
-        let zero = [cos_o.token().splat_f32x16(0.0); N];
+        mut put: impl FnMut(usize, [f32x16<S>; N]),
+    ) {
         let highlight = match self {
-            LobeLanes::None => return [times(cos_i), zero, zero],
+            LobeLanes::None => return put(0, products(cos_i, weight)),
             LobeLanes::Ggx(numbers) => {
                 let numbers = numbers.map(|number| f32x16::simd_from(cos_o.token(), number));
-                return GgxLobe::eval_lanes(numbers, cos_i, cos_o, cos_io).map(times);
+                let [base, rest, grazing] = GgxLobe::eval_lanes(numbers, cos_i, cos_o, cos_io);
+                put(0, products(base, weight));
+                put(1, products(rest, weight));
+                return put(2, products(grazing, weight));
             }
             LobeLanes::Phong(powers) => PhongLobe::eval_lanes(powers, cos_i, cos_o, cos_io),
             LobeLanes::BlinnPhong(powers) => BlinnPhongLobe::eval_lanes(powers, cos_i, cos_o, cos_io),
         };
-        [times(cos_i), times(highlight), zero]
+        put(0, products(cos_i, weight));
+        put(1, products(highlight, weight));
     }
+}
+
+#[inline(always)]
+fn products<S: Simd, const N: usize>(one: [f32x16<S>; N], other: [f32x16<S>; N]) -> [f32x16<S>; N] {
+    std::array::from_fn(
+        #[inline(always)]
+        |i| one[i] * other[i],
+    )
 }

@@ -140,20 +140,18 @@ impl Fragments {
         while let Some(RayPoint { shape, point, is_layered, .. }) = rays.first().copied() {
             let first = self.rays.len();
             let (mut is_first, mut last) = (true, None);
-            let is_alike = |ray: &mut RayPoint| {
+            rays.retain(|ray| {
                 let is_same = || ray.shape == shape && (shape.is_some() || is_one_surface(&point, &ray.point));
                 // Of several layers of one surface on a ray, each is in a fragment of its own
                 let is_alike = std::mem::take(&mut is_first)
                     || grouped && ray.is_layered == is_layered && last != Some(ray.at) && is_same();
                 if is_alike {
                     last = Some(ray.at);
+                    self.rays.push(ray.point);
+                    self.at.push(ray.at);
                 }
-                is_alike
-            };
-            for RayPoint { point, at, .. } in rays.extract_if(.., is_alike) {
-                self.rays.push(point);
-                self.at.push(at);
-            }
+                !is_alike
+            });
             let share = if grouped { (self.rays.len() - first) as f32 / all } else { 1.0 };
             self.push(scene, number, at, shape, first, share, is_layered);
         }

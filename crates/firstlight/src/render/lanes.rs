@@ -166,9 +166,16 @@ fn gather_area<S: Simd>(
         }
         let cos_i = height * inverse_distance;
         let cos_io = wo.dot(l) * inverse_distance;
-        for (sum, [moment]) in sums.iter_mut().zip(lobe.moments([cos_i], splat(cos_o), [cos_io], [weight])) {
-            *sum += lit.select(moment, zero);
-        }
+        lobe.for_each_moment(
+            [cos_i],
+            splat(cos_o),
+            [cos_io],
+            [weight],
+            #[inline(always)]
+            |moment, [value]| {
+                sums[moment] += lit.select(value, zero);
+            },
+        );
     }
     LobeSums(sums.map(partials))
 }

@@ -1,6 +1,7 @@
 //! The shapes that camera rays can hit one by one, and the materials that squares of pixels see on them.
 
 use std::f32::consts::PI;
+use std::iter;
 
 use super::square::Square;
 use crate::color::Rgb;
@@ -64,7 +65,14 @@ impl MeanBsdf {
     /// The mean of at least one material.
     pub fn of(mut bsdfs: impl Iterator<Item = Bsdf>) -> Option<MeanBsdf> {
         let first = bsdfs.next()?;
-        let (mut sum, mut mean, mut count) = (first, MeanBsdf::constant(first), 1.0f32);
+        let mut same = 0;
+        let is_other = |bsdf: &Bsdf| {
+            same += 1;
+            *bsdf != first
+        };
+        let Some(other) = bsdfs.find(is_other) else { return Some(MeanBsdf::constant(first)) };
+        let bsdfs = iter::repeat_n(first, same - 1).chain([other]).chain(bsdfs);
+        let (mut sum, mut count) = (first, 1.0f32);
         let (mut least, mut most) = (first.colors, first.colors);
         let mut lobes = MeanLobe::new(first.lobe);
         for bsdf in bsdfs {
@@ -72,18 +80,14 @@ impl MeanBsdf {
             sum.ambient += bsdf.ambient;
             count += 1.0;
             (least, most) = (least.min(bsdf.colors), most.max(bsdf.colors));
-            mean.is_constant &= bsdf == first;
             lobes.add(bsdf.lobe);
         }
-        if !mean.is_constant {
-            let part = 1.0 / count;
-            let lobe = lobes.mean(TOLERANCE.same_lobe);
-            mean.lobes_differ = lobe.is_none();
-            let lobe = lobe.unwrap_or(first.lobe);
-            mean.bsdf = Bsdf { colors: sum.colors * part, ambient: sum.ambient * part, lobe };
-            mean.contrast = most + least * -1.0;
-        }
-        Some(mean)
+        let part = 1.0 / count;
+        let lobe = lobes.mean(TOLERANCE.same_lobe);
+        let lobes_differ = lobe.is_none();
+        let lobe = lobe.unwrap_or(first.lobe);
+        let bsdf = Bsdf { colors: sum.colors * part, ambient: sum.ambient * part, lobe };
+        Some(MeanBsdf { bsdf, is_constant: false, contrast: most + least * -1.0, lobes_differ })
     }
 }
 

@@ -175,8 +175,8 @@ impl CellRenderer<'_> {
                 }
             };
             let is_layered = left != 1.0 || coat.is_some();
-            let both = iter::once(point).chain(coat);
-            points.extend(both.map(|point| RayPoint { shape, point, at, is_layered }));
+            points.push(RayPoint { shape, point, at, is_layered });
+            points.extend(coat.map(|point| RayPoint { shape, point, at, is_layered }));
         }
         let number = self.pixels.len() as u32;
         self.pixels.push(pixel);

@@ -371,10 +371,16 @@ impl<'a, S: Simd> ReceiverLanes<'a, S> {
         let weight = is_above.select(self.area.weight_lanes(points, block, l, inverse_distance), zero);
         samples.sends = weight.simd_gt(zero).to_bitmask() as u16;
         let (cos_i, cos_io) = (height * inverse_distance, self.wo.dot(l) * inverse_distance);
-        let moments = self.lobe.moments([cos_i], self.cos_o, [cos_io], [weight]);
-        for (sent, [moment]) in samples.sent.iter_mut().zip(moments) {
-            is_above.select(moment, zero).store_slice(sent);
-        }
+        self.lobe.for_each_moment(
+            [cos_i],
+            self.cos_o,
+            [cos_io],
+            [weight],
+            #[inline(always)]
+            |moment, [value]| {
+                is_above.select(value, zero).store_slice(&mut samples.sent[moment]);
+            },
+        );
         samples
     }
 }
