@@ -158,8 +158,8 @@ fn hold(seeds: std::ops::Range<u64>, count: u32, kinds: Kinds) {
 
 #[test]
 fn lights_taken_for_one_do_not_show() {
-    hold(0..8, 100, Kinds::Points);
-    hold(20..26, 1500, Kinds::Points);
+    hold(0..6, 100, Kinds::Points);
+    hold(20..24, 1500, Kinds::Points);
 }
 
 #[test]
