@@ -8,6 +8,7 @@ use super::{Scene, SceneDesc};
 use crate::camera::Projection;
 use crate::context::{CompileContext, show};
 use crate::light::{Area, LightDesc, LightKind, Spot};
+use crate::material::Material;
 use crate::math::{DVec3, UNIT_ROUNDOFF};
 use crate::parallel;
 use crate::shape::Solid;
@@ -29,6 +30,7 @@ pub(super) fn advise(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc) {
         return;
     }
     advise_light(cx, scene);
+    advise_emission(cx, scene, desc);
     if !search.met && (scene.geometry.bounds().is_some() || !scene.geometry.unbounded.is_empty()) {
         advise_view(cx, scene, desc, &search);
     }
@@ -178,7 +180,10 @@ fn framed(scene: &Scene) -> Option<[[u32; 2]; 2]> {
 /// Advises if every surface is black.
 fn advise_light(cx: &mut CompileContext, scene: &Scene) {
     let shines = |c: &crate::color::Rgb| c.r > 0.0 || c.g > 0.0 || c.b > 0.0;
-    if !scene.ambient.is_black() || scene.lights.iter().any(|light| shines(&light.intensity)) {
+    if !scene.ambient.is_black()
+        || scene.lights.iter().any(|light| shines(&light.intensity))
+        || scene.materials.iter().any(Material::is_emissive)
+    {
         return;
     }
     let message = match scene.lights.len() {
@@ -187,6 +192,20 @@ fn advise_light(cx: &mut CompileContext, scene: &Scene) {
     };
     let hint = "add a [[light.directional]] with a direction, or ambient to [render]";
     cx.advise("light", message, Some(hint));
+}
+
+/// Advises that surfaces that emit light are no lights.
+fn advise_emission(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc) {
+    let is_emissive = |(material, _): &(&Material, _)| !material.common.emissive.factor.is_black();
+    let mut emissive = scene.materials.iter().zip(&desc.materials).filter(is_emissive).map(|(_, (name, _))| name);
+    let Some(first) = emissive.next() else { return };
+    let names = match emissive.count() {
+        0 => format!("material {first:?} emits"),
+        1 => format!("material {first:?} and another one emit"),
+        more => format!("material {first:?} and {more} others emit"),
+    };
+    let hint = "add a light of the same shape, with visible = false, where they should light the scene";
+    cx.advise("material", format!("{names} light that is seen, and that lights nothing"), Some(hint));
 }
 
 /// Advises that nothing is in the picture.
@@ -331,6 +350,18 @@ mod tests {
         assert_eq!(said(&format!("{BALL}[render]\nambient = 0.1\n")), [""; 0]);
         for builtin in crate::scene::builtin_scenes() {
             assert_eq!(said(builtin.text), [""; 0], "{}", builtin.name);
+        }
+    }
+
+    #[test]
+    fn emission_lights_nothing() {
+        let shining = "[material.phong.a]\nemissive = 2\n[material.unlit.b]\nemissive = [0, 1, 0]\n\
+                       [material.unlit.c]\ncolor = 3\n";
+        let hint = "add a light of the same shape, with visible = false, where they should light the scene";
+        let text = "material \"a\" and another one emit light that is seen, and that lights nothing";
+        // Without lights they are not black either
+        for light in [LIGHT, ""] {
+            assert_eq!(said(&format!("{BALL}{light}{shining}")), [format!("s.toml:1:1: material: {text}; {hint}")]);
         }
     }
 
