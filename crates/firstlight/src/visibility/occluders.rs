@@ -155,12 +155,8 @@ impl OccluderList {
         let mut found = 0;
         let all = geometry.upper.gather(
             simd,
+            |center, half| upright.within(center, half).test(),
             #[inline(always)]
-            |center, half| {
-                let shaft = upright.within(center, half);
-                #[inline(always)]
-                move |simd, node: &_| shaft.meet(simd, node)
-            },
             |item| {
                 found += 1;
                 match geometry.items[item as usize] {
@@ -219,12 +215,7 @@ impl OccluderList {
             || {
                 mesh.mesh.tree.gather(
                     simd,
-                    #[inline(always)]
-                    |center, half| {
-                        let shaft = shaft.within(center, half);
-                        #[inline(always)]
-                        move |simd, node: &_| shaft.meet(simd, node)
-                    },
+                    |center, half| shaft.within(center, half).test(),
                     #[inline(always)]
                     |leaf| {
                         let room = self.leaves.len() < cap;
@@ -251,12 +242,8 @@ fn layers_within(level: Level, scene: &Scene, target: &Target, shaft: &Shaft) ->
     // Whether all that is found is none
     let is_clear = dispatch_all!(level, simd => layers.upper.gather(
         simd,
+        |center, half| upright.within(center, half).test(),
         #[inline(always)]
-        |center, half| {
-            let shaft = upright.within(center, half);
-            #[inline(always)]
-            move |simd, node: &_| shaft.meet(simd, node)
-        },
         |item| match layers.items[item as usize] {
             UpperItem::Sphere(i) => !geometry.casts(geometry.spheres[i as usize].surface, target.light),
             UpperItem::Parallelogram(i) => {
@@ -280,17 +267,6 @@ fn layers_within(level: Level, scene: &Scene, target: &Target, shaft: &Shaft) ->
 fn is_clear_of_mesh<S: Simd>(simd: S, mesh: &Mesh, shaft: &Shaft) -> bool {
     simd.vectorize(
         #[inline(always)]
-        || {
-            mesh.tree.gather(
-                simd,
-                #[inline(always)]
-                |center, half| {
-                    let shaft = shaft.within(center, half);
-                    #[inline(always)]
-                    move |simd, node: &_| shaft.meet(simd, node)
-                },
-                |_| false,
-            )
-        },
+        || mesh.tree.gather(simd, |center, half| shaft.within(center, half).test(), |_| false),
     )
 }

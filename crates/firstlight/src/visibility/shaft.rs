@@ -205,6 +205,13 @@ impl Shaft {
 }
 
 impl TreeShaft {
+    /// [`meet`](Self::meet), to visit a tree with.
+    #[inline(always)]
+    pub fn test<S: Simd>(self) -> impl Fn(S, &BoxNode) -> (u32, f32x8<S>) {
+        #[inline(always)]
+        move |simd, node| self.meet(simd, node)
+    }
+
     /// The children of a node that the shaft intersects, a bit for each, and the least s of each. The padding covers
     /// the rounding; no instruction set fuses multiplication and addition, so all compute the same.
     #[inline(always)]

@@ -312,7 +312,7 @@ impl TriangleTree {
         if !ray.is_valid {
             return false;
         }
-        self.any_below(simd, 0, ray, &self.slabs(ray), t_max, filter)
+        self.any_below(simd, 0, ray, &self.slabs(ray), t_max, &mut |hit| filter(hit.triangle))
     }
 
     /// Where a ray meets a triangle with these corners, which it is known to meet.
@@ -327,32 +327,11 @@ impl TriangleTree {
         if !ray.is_valid {
             return false;
         }
-        let slabs = self.slabs(ray);
-        self.tree.any_below(
-            simd,
-            0,
-            &slabs,
-            t_max,
-            #[inline(always)]
-            |leaf| {
-                let pack = &self.packs[leaf as usize];
-                let mut mask = self.candidates(simd, ray, pack);
-                while mask != 0 {
-                    let place = mask.trailing_zeros() as usize % PACK;
-                    mask &= mask - 1;
-                    if let Some(Crossing { t, u, v }) = intersect(ray, &slabs, &pack.triangle(place))
-                        && t > 0.0
-                        && t <= t_max
-                        && hit(TriangleHit { t, u, v, triangle: pack.ids[place] })
-                    {
-                        return true;
-                    }
-                }
-                false
-            },
-        )
+        self.any_below(simd, 0, ray, &self.slabs(ray), t_max, &mut hit)
     }
 
+    /// Visits the triangles below a child of a node on a ray, 0 < t <= `t_max`, until `hit` returns `true`. Returns
+    /// whether it did.
     #[inline(always)]
     fn any_below<S: Simd>(
         &self,
@@ -361,7 +340,7 @@ impl TriangleTree {
         ray: &TraceRay,
         slabs: &Slabs,
         t_max: f32,
-        filter: &impl Fn(u32) -> bool,
+        hit: &mut impl FnMut(TriangleHit) -> bool,
     ) -> bool {
         self.tree.any_below(
             simd,
@@ -375,10 +354,10 @@ impl TriangleTree {
                 while mask != 0 {
                     let place = mask.trailing_zeros() as usize % PACK;
                     mask &= mask - 1;
-                    if let Some(hit) = intersect(ray, slabs, &pack.triangle(place))
-                        && hit.t > 0.0
-                        && hit.t <= t_max
-                        && filter(pack.ids[place])
+                    if let Some(Crossing { t, u, v }) = intersect(ray, slabs, &pack.triangle(place))
+                        && t > 0.0
+                        && t <= t_max
+                        && hit(TriangleHit { t, u, v, triangle: pack.ids[place] })
                     {
                         return true;
                     }
@@ -462,7 +441,9 @@ impl TriangleTree {
                     for lane in bits(asking) {
                         let ray = rays.ray(lane);
                         let counts = |id| filter(id, 1 << lane) != 0;
-                        let is_hit = self.any_below(simd, child, &ray, &self.slabs(&ray), t_max[lane], &counts);
+                        let is_hit = self.any_below(simd, child, &ray, &self.slabs(&ray), t_max[lane], &mut |hit| {
+                            counts(hit.triangle)
+                        });
                         done |= u64::from(is_hit) << lane;
                     }
                     done
