@@ -119,26 +119,36 @@ impl DisplaySteps {
         } else {
             value.map(|value| self.slope(value, least) / allowed)
         };
-        let coupling = self.coupling.as_ref().map(|coupling| {
-            let channels = coupling.within(value, value.map(|value| least.max(value * SMALL)));
-            CoupledSlopes { channels, of_peak: channels.of_peak * self.slope(channels.peak, least) / allowed }
-        });
+        let coupling = self.coupling.as_ref().map(|coupling| self.coupled_slopes(coupling, value, least, allowed));
         ErrorSlopes { own, coupling }
+    }
+
+    #[inline(never)]
+    fn coupled_slopes(&self, coupling: &NeutralCoupling, value: Rgb, least: f32, allowed: f32) -> CoupledSlopes {
+        let channels = coupling.within(value, value.map(|value| least.max(value * SMALL)));
+        CoupledSlopes { channels, of_peak: channels.of_peak * self.slope(channels.peak, least) / allowed }
     }
 
     /// The most steps of any channel.
     #[inline(always)]
     pub fn of_color(&self, value: Rgb, error: Rgb) -> f32 {
-        let of = |v, e| self.of_error(v, e);
-        let own = |error: Rgb| of(value.r, error.r).max(of(value.g, error.g)).max(of(value.b, error.b));
         match &self.coupling {
-            None => own(error),
-            Some(coupling) => {
-                let channels = coupling.within(value, error);
-                let of_peak = channels.peak_error(error);
-                own(channels.with_least(error)) + channels.of_peak * of(channels.peak + of_peak, of_peak)
-            }
+            None => self.of_channels(value, error),
+            Some(coupling) => self.of_coupled(coupling, value, error),
         }
+    }
+
+    #[inline(always)]
+    fn of_channels(&self, value: Rgb, error: Rgb) -> f32 {
+        self.of_error(value.r, error.r).max(self.of_error(value.g, error.g)).max(self.of_error(value.b, error.b))
+    }
+
+    #[inline(never)]
+    fn of_coupled(&self, coupling: &NeutralCoupling, value: Rgb, error: Rgb) -> f32 {
+        let channels = coupling.within(value, error);
+        let of_peak = channels.peak_error(error);
+        self.of_channels(value, channels.with_least(error))
+            + channels.of_peak * self.of_error(channels.peak + of_peak, of_peak)
     }
 }
 
