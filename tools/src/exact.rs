@@ -9,8 +9,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use firstlight::SceneDesc;
+use firstlight::{SceneDesc, TextureDesc};
 use firstlight_testkit::converged::{Bounds, Converged, Deviation, PROMISED, Report, SceneError};
+use firstlight_testkit::pictures::FormulaPictures;
 use firstlight_testkit::{exact_scenes, kept};
 
 use crate::{Outcome, root, slow, write};
@@ -346,9 +347,15 @@ pub fn run(options: &Options) -> Outcome {
     if let Some(folder) = &options.dump {
         std::fs::create_dir_all(folder).map_err(|fault| format!("{}: {fault}", folder.display()))?;
         for seed in options.seeds.iter().cloned().flatten() {
-            let text = options.scene(seed).to_toml();
-            let file = folder.join(format!("{seed}.toml"));
-            std::fs::write(&file, text).map_err(|fault| format!("{}: {fault}", file.display()))?;
+            let desc = options.scene(seed);
+            let pictures = desc.textures.iter().filter_map(|(_, texture)| match texture {
+                TextureDesc::Image(image) => Some((image.file.0.clone(), FormulaPictures::file(&image.file.0)?)),
+                _ => None,
+            });
+            for (name, bytes) in pictures.chain([(format!("{seed}.toml"), desc.to_toml().into_bytes())]) {
+                let file = folder.join(name);
+                std::fs::write(&file, bytes).map_err(|fault| format!("{}: {fault}", file.display()))?;
+            }
         }
         return Ok(());
     }
