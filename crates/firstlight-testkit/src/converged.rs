@@ -229,6 +229,12 @@ impl Converged {
         converged
     }
 
+    /// Asks sets of 2^`first` to 2^`cap` points for the pixels that are still open.
+    #[track_caller]
+    pub fn go_on(&mut self, first: u32, cap: u32) {
+        self.settle(first, cap);
+    }
+
     /// Nothing is known yet: every pixel is open.
     #[track_caller]
     pub(crate) fn unknown(desc: &SceneDesc) -> Self {
