@@ -117,9 +117,9 @@ fn shadows_whose_outlines_cross_are_told_closely() {
     assert!(off < 0.15, "{off} steps");
 }
 
-/// Renders a square of a scene's film, its light shared among camera rays and not, and compares them. Both may be off by
-/// the tolerance: pixels that differ by more than is allowed are rendered once more, with each ray lit by itself to a
-/// quarter of the tolerance, and that decides.
+/// Renders a square of a scene's film, its light shared among camera rays and not, and compares them. Both may be off
+/// by the tolerance: pixels that differ by more than is allowed are rendered once more, with each ray lit by itself to
+/// a quarter of the tolerance, and that decides.
 fn compare_part(name: &str, desc: &SceneDesc, [x, y]: [u32; 2], size: u32) {
     let mut desc = with_samples(desc, SamplesDesc::Exact, SampleSet::Sobol, 0);
     let scene = compile(&desc);
