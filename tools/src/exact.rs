@@ -9,8 +9,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use firstlight::SceneDesc;
+use firstlight::{SceneDesc, TextureDesc};
 use firstlight_testkit::converged::{Bounds, Converged, Deviation, PROMISED, Report, SceneError};
+use firstlight_testkit::pictures::FormulaPictures;
 use firstlight_testkit::{exact_scenes, kept};
 
 use crate::{Outcome, root, slow, write};
@@ -176,14 +177,19 @@ impl Options {
     }
 }
 
-/// The one that is kept, or a new one, and then that is.
+/// The one that is kept, or one with more points where that had too few, or a new one; and then that is kept.
 fn converged(seed: u64, desc: &SceneDesc, options: &Options) -> Converged {
     let path = options.kept(seed);
-    kept::read(&path, desc, options.cap).unwrap_or_else(|| {
+    let Some((mut truth, cap)) = kept::read(&path, desc) else {
         let truth = Converged::new(desc, options.cap);
         kept::write(&path, desc, options.cap, &truth);
-        truth
-    })
+        return truth;
+    };
+    if truth.open() > 0 && cap < options.cap {
+        truth.go_on(cap + 1, options.cap);
+        kept::write(&path, desc, options.cap, &truth);
+    }
+    truth
 }
 
 fn row(seed: u64, options: &Options, commit: &str) -> Row {
@@ -228,6 +234,18 @@ fn row(seed: u64, options: &Options, commit: &str) -> Row {
     }
     row.seconds = start.elapsed().as_secs_f64();
     row
+}
+
+/// The rows by what the scenes were for, as far as there are any: those without metals and dielectrics; of the others
+/// those that the engine was tuned with, and those that it was not.
+fn groups(rows: &BTreeMap<u64, Row>) -> Vec<(&'static str, Vec<&Row>)> {
+    let of = |wanted: fn(u64) -> bool| rows.values().filter(|row| wanted(row.seed)).collect::<Vec<_>>();
+    let groups = [
+        ("Phong and Blinn-Phong", of(|seed| seed < exact_scenes::SURFACES)),
+        ("Metals and dielectrics, even numbers", of(|seed| seed >= exact_scenes::SURFACES && seed % 2 == 0)),
+        ("Metals and dielectrics, odd numbers", of(|seed| seed >= exact_scenes::SURFACES && seed % 2 == 1)),
+    ];
+    groups.into_iter().filter(|(_, rows)| !rows.is_empty()).collect()
 }
 
 /// What many scenes say together.
@@ -328,7 +346,10 @@ fn store(rows: &BTreeMap<u64, Row>) -> Outcome {
     let (head, tail) = (&page[..from + start.len()], &page[to..]);
     let mut notable: Vec<&Row> = rows.values().filter(|row| row.is_notable()).collect();
     notable.sort_by(|a, b| b.worst.total_cmp(&a.worst));
-    let mut measured = format!("\n{}\n", summary(rows.values(), 1.0).lines);
+    let mut measured = String::from("\n");
+    for (name, rows) in groups(rows) {
+        let _ = writeln!(measured, "{name}:\n\n{}", summary(rows.into_iter(), 1.0).lines);
+    }
     if !notable.is_empty() {
         let _ = writeln!(
             measured,
@@ -346,9 +367,15 @@ pub fn run(options: &Options) -> Outcome {
     if let Some(folder) = &options.dump {
         std::fs::create_dir_all(folder).map_err(|fault| format!("{}: {fault}", folder.display()))?;
         for seed in options.seeds.iter().cloned().flatten() {
-            let text = options.scene(seed).to_toml();
-            let file = folder.join(format!("{seed}.toml"));
-            std::fs::write(&file, text).map_err(|fault| format!("{}: {fault}", file.display()))?;
+            let desc = options.scene(seed);
+            let pictures = desc.textures.iter().filter_map(|(_, texture)| match texture {
+                TextureDesc::Image(image) => Some((image.file.0.clone(), FormulaPictures::file(&image.file.0)?)),
+                _ => None,
+            });
+            for (name, bytes) in pictures.chain([(format!("{seed}.toml"), desc.to_toml().into_bytes())]) {
+                let file = folder.join(name);
+                std::fs::write(&file, bytes).map_err(|fault| format!("{}: {fault}", file.display()))?;
+            }
         }
         return Ok(());
     }
@@ -405,8 +432,12 @@ pub fn run(options: &Options) -> Outcome {
         return Ok(());
     }
     let rows = rows.into_inner().expect("no thread panics while it holds the rows");
-    let Summary { lines, faults } = summary(rows.values(), options.tolerance);
-    println!("\n{lines}");
+    let mut faults = Vec::new();
+    for (name, rows) in groups(&rows) {
+        let summary = summary(rows.into_iter(), options.tolerance);
+        println!("\n{name}:\n\n{}", summary.lines);
+        faults.extend(summary.faults);
+    }
     if faults.is_empty() {
         return Ok(());
     }

@@ -10,7 +10,9 @@
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
-use firstlight::{AaMode, Falloff, Image, LightDesc, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc, Window};
+use firstlight::{
+    AaMode, AlphaMode, Falloff, Image, LightDesc, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc, Window,
+};
 
 use crate::graded;
 use crate::scenes::*;
@@ -77,7 +79,8 @@ pub fn sampled(desc: &SceneDesc, set: SampleSet, count: u32) -> Image {
 /// Red, green and blue as they are displayed, in steps of an 8-bit picture, not rounded. What is not a number is as far
 /// off as can be.
 pub fn displayed(scene: &Scene, [r, g, b, _]: [f32; 4]) -> [f64; 3] {
-    [r, g, b].map(|x| if x.is_nan() { f64::INFINITY } else { 255.0 * scene.display().encode(x) })
+    let shown = scene.display().encode_color([r, g, b]);
+    std::array::from_fn(|k| if [r, g, b][k].is_nan() { f64::INFINITY } else { 255.0 * shown[k] })
 }
 
 fn furthest(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -154,16 +157,17 @@ fn windows(wanted: &[bool], width: u32, height: u32, level: u32) -> Vec<Window> 
 
 /// Whether a light that weakens with the square of the distance is so near to what a pixel shows that points of equal
 /// shares of it can all miss the part that sends most, and agree.
-fn is_near(desc: &SceneDesc, scene: &Scene, [i, j]: [u32; 2]) -> bool {
+fn is_near(desc: &SceneDesc, scenes: &[Scene], [i, j]: [u32; 2]) -> bool {
     let n = desc.render.antialiasing;
     let rays = (0..n * n).map(|k| [k % n, k / n].map(|w| (w as f32 + 0.5) / n as f32));
-    let shown: Vec<V> = rays
-        .filter_map(|[x, y]| {
+    let hits = rays.flat_map(|[x, y]| {
+        scenes.iter().filter_map(move |scene| {
             let (ray, _) = scene.camera().ray(i as f32 + x, j as f32 + y, 1.0);
             let hit = scene.intersect(&ray)?;
             Some(add(ray.o.to_array(), mul(ray.d.to_array().map(f64::from), hit.t)))
         })
-        .collect();
+    });
+    let shown: Vec<V> = hits.collect();
     let is_near = |light: &LightDesc| {
         let (size, distance): (f64, Box<dyn Fn(V) -> f64>) = match light {
             LightDesc::Rectangle(light) if light.falloff == Falloff::Physical => {
@@ -201,6 +205,15 @@ fn is_near(desc: &SceneDesc, scene: &Scene, [i, j]: [u32; 2]) -> bool {
     desc.lights.iter().any(is_near)
 }
 
+/// The scene without alpha, where it has any.
+fn opaque(desc: &SceneDesc) -> Option<SceneDesc> {
+    let mut desc = desc.clone();
+    let modes = desc.materials.iter_mut().filter_map(|(_, material)| Some(&mut common_of(material)?.alpha_mode));
+    let layered = modes.filter(|mode| **mode != AlphaMode::Opaque);
+    let count = layered.map(|mode| *mode = AlphaMode::Opaque).count();
+    (count > 0).then_some(desc)
+}
+
 /// The side m of the sets of m x m points, about 2^`level` points.
 fn side(level: u32) -> u32 {
     let whole = 1u32 << (level / 2);
@@ -216,16 +229,24 @@ impl Converged {
         converged
     }
 
+    /// Asks sets of 2^`first` to 2^`cap` points for the pixels that are still open.
+    #[track_caller]
+    pub fn go_on(&mut self, first: u32, cap: u32) {
+        self.settle(first, cap);
+    }
+
     /// Nothing is known yet: every pixel is open.
     #[track_caller]
     pub(crate) fn unknown(desc: &SceneDesc) -> Self {
         let (width, height) = (desc.render.width, desc.render.height);
         let count = (width * height) as usize;
-        let scene = compile(desc);
-        let near = (0..count).map(|i| is_near(desc, &scene, [i as u32 % width, i as u32 / width])).collect();
+        // What masks and veils are in front of, and they themselves
+        let mut scenes = vec![compile(desc)];
+        scenes.extend(opaque(desc).map(|desc| compile(&desc)));
+        let near = (0..count).map(|i| is_near(desc, &scenes, [i as u32 % width, i as u32 / width])).collect();
         Converged {
             desc: desc.clone(),
-            scene,
+            scene: scenes.swap_remove(0),
             near,
             width,
             height,

@@ -2,6 +2,7 @@
 //! pictures that are neither black nor blown out.
 
 mod families;
+mod surfaces;
 
 use firstlight::{
     BoxDesc, ColorDesc, ColorParam, ConeDesc, CylinderDesc, DiskDesc, DiskLightDesc, DisplayEncoding, EmitSides,
@@ -21,11 +22,15 @@ const TRIES: u64 = 64;
 /// light, lights that cut floors at a shallow angle, lights close to floors, specks, hard shadows, rims of checkers.
 pub const SMOOTH: u64 = 1000;
 
+/// From this number on scenes are like the first thousand, of metals and dielectrics with pictures, normal maps, masks,
+/// veils and clear coats.
+pub const SURFACES: u64 = 2000;
+
 /// Scene number `seed`, `size` x `size` pixels. The size decides nothing else.
 pub fn scene(seed: u64, size: u32) -> SceneDesc {
     let mut tries = (0..TRIES).map(|i| {
         let mut random = Random::new((seed << 8) + i);
-        match seed.checked_sub(SMOOTH).map(Family::of) {
+        match Family::of(seed) {
             None => exposed(composed(&mut random), &mut random, true),
             Some(family) => exposed(family.scene(&mut random), &mut random, family.is_integrated()),
         }
@@ -42,6 +47,7 @@ fn exposed(mut scene: SceneDesc, random: &mut Random, is_integrated: bool) -> Op
     let mut small = with_samples(&scene, 36, SampleSet::Grid, 0);
     (small.render.width, small.render.height, small.render.antialiasing) = (16, 16, 1);
     (small.render.ambient, small.render.exposure) = (ColorDesc::gray(0.0).into(), 0.0);
+    emission(&mut small).for_each(|strength| *strength = 0.0);
     let one = picture(&compile(&small), &traced());
     let other = picture(&compile(&with_samples(&small, 36, SampleSet::Uniform, 1)), &traced());
     let differs = |(a, b): (&[f32; 4], &[f32; 4])| (0..3).any(|k| (a[k] - b[k]).abs() > 0.01 * a[k].max(b[k]));
@@ -71,6 +77,7 @@ fn exposed(mut scene: SceneDesc, random: &mut Random, is_integrated: bool) -> Op
     let stops = (4.0 * pxfm::f_log2(random.between(0.25, 0.9) / bright)).round() / 4.0;
     if random.chance(0.4) && stops.abs() < 60.0 {
         scene.render.exposure = stops;
+        emission(&mut scene).for_each(|strength| *strength *= pxfm::f_exp2(-stops));
     } else {
         let gain = pxfm::f_exp2(stops);
         for light in &mut scene.lights {
@@ -85,6 +92,13 @@ fn exposed(mut scene: SceneDesc, random: &mut Random, is_integrated: bool) -> Op
         }
     }
     Some(scene)
+}
+
+/// What multiplies the radiance of materials that emit.
+fn emission(scene: &mut SceneDesc) -> impl Iterator<Item = &mut f64> {
+    let all = scene.materials.iter_mut().filter_map(|(_, material)| common_of(material));
+    let emissive = all.filter(|common| common.emissive != ColorParam::gray(0.0));
+    emissive.map(|common| &mut common.emissive_strength)
 }
 
 fn composed(random: &mut Random) -> SceneDesc {
@@ -106,6 +120,11 @@ fn composed(random: &mut Random) -> SceneDesc {
         scene.render.ambient = ambient.into();
     }
     let stage = Stage::new(random);
+    staged(random, &stage, scene)
+}
+
+/// A scene with materials gets shapes, lights and a camera.
+fn staged(random: &mut Random, stage: &Stage, mut scene: SceneDesc) -> SceneDesc {
     scene = stage.set(random, scene);
     // What stands between light and stage
     let lights: Vec<_> = (0..1 + random.below(2) * random.below(4)).map(|_| stage.place_light(random)).collect();

@@ -50,10 +50,10 @@ pub fn write(path: &Path, desc: &SceneDesc, cap: u32, truth: &Converged) {
     std::fs::rename(&part, path).unwrap_or_else(|fault| panic!("{}: {fault}", path.display()));
 }
 
-/// Reads it again. `None` if the file is not there, shows another scene, or stopped at fewer points than 2^`cap` with
-/// pixels open.
+/// Reads it again, with the logarithm to base 2 of the points that its largest sets may have had. `None` if the file is
+/// not there or shows another scene.
 #[track_caller]
-pub fn read(path: &Path, desc: &SceneDesc, cap: u32) -> Option<Converged> {
+pub fn read(path: &Path, desc: &SceneDesc) -> Option<(Converged, u32)> {
     let file = std::fs::File::open(path).ok()?;
     let fault = |what: &dyn std::fmt::Display| -> ! { panic!("{}: {what}", path.display()) };
     let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().unwrap_or_else(|e| fault(&e));
@@ -75,6 +75,5 @@ pub fn read(path: &Path, desc: &SceneDesc, cap: u32) -> Option<Converged> {
         truth.open[i] = alpha == 0;
         truth.levels[i] = u32::from((u16::MAX - alpha) / LEVEL);
     }
-    let enough = truth.open() == 0 || text(CAP)?.parse::<u32>().ok()? >= cap;
-    enough.then_some(truth)
+    Some((truth, text(CAP)?.parse().ok()?))
 }

@@ -1,7 +1,8 @@
 //! What the tests of whole scenes, fuzzing and `cargo xtask` share. Not published, and no part of the library: here a
 //! broken promise is a panic.
 //!
-//! [`scenes`] builds scenes and looks at them; [`random`] and [`exact_scenes`] make them up; [`converged`] knows how
+//! [`scenes`] builds scenes and looks at them; [`random`] and [`exact_scenes`] make them up, with [`pictures`] by
+//! formula; [`converged`] knows how
 //! they look when nothing is left to chance, with [`graded`] points where a light is near and [`kept`] files where that
 //! took long; [`hostile_text`], [`hostile_mesh`] and [`hostile_picture`] are what fuzzing holds the readers to.
 
@@ -22,6 +23,8 @@ pub mod hostile_text;
 #[cfg(feature = "scenes")]
 pub mod kept;
 mod numbers;
+#[cfg(feature = "scenes")]
+pub mod pictures;
 #[cfg(feature = "scenes")]
 pub mod random;
 #[cfg(feature = "scenes")]

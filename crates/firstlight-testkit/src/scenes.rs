@@ -5,12 +5,13 @@ use std::ops::ControlFlow;
 
 use firstlight::{
     AaMode, BlinnPhongDesc, CameraDesc, CheckerboardDesc, ColorDesc, ColorParam, CompileOptions, DirectionalDesc,
-    DisplayEncoding, Image, InstanceDesc, LightDesc, MaterialDesc, MeshDesc, NoAssets, NumberParam, ParallelogramDesc,
-    PhongDesc, PointDesc, RectangleDesc, RenderDesc, RenderSettings, SampleSet, Scene, SceneDesc, ShapeDesc,
-    SphereDesc, SpotDesc, TextureDesc, TransformDesc, builtin_scenes,
+    DisplayEncoding, Image, InstanceDesc, LightDesc, MaterialCommonDesc, MaterialDesc, MeshDesc, NoAssets, NumberParam,
+    ParallelogramDesc, PhongDesc, PointDesc, RectangleDesc, RenderDesc, RenderSettings, SampleSet, Scene, SceneDesc,
+    ShapeDesc, SphereDesc, SpotDesc, TextureDesc, TransformDesc, builtin_scenes,
 };
 
 pub use crate::Random;
+use crate::pictures::FormulaPictures;
 
 /// A point or a direction, as descriptions have them.
 pub type V = [f64; 3];
@@ -190,6 +191,16 @@ pub fn common(shape: &mut ShapeDesc) -> Common<'_> {
     of!(Sphere Parallelogram Plane Disk Rectangle Box Cylinder Cone Torus Mesh PointSet Instance)
 }
 
+/// What materials of all kinds can say, but for those that are unlit.
+pub fn common_of(material: &mut MaterialDesc) -> Option<&mut MaterialCommonDesc> {
+    match material {
+        MaterialDesc::Phong(desc) => Some(&mut desc.common),
+        MaterialDesc::BlinnPhong(desc) => Some(&mut desc.common),
+        MaterialDesc::MetallicRoughness(desc) => Some(&mut desc.common),
+        MaterialDesc::Unlit(_) => None,
+    }
+}
+
 /// The shape, scaled, turned and moved.
 pub fn moved(mut shape: ShapeDesc, translate: V, rotate_deg: V, scale: V) -> ShapeDesc {
     let transform = TransformDesc { translate, rotate_deg, scale: scale.into(), ..TransformDesc::default() };
@@ -323,10 +334,10 @@ impl Build for SceneDesc {
     }
 }
 
-/// Ready to be rendered.
+/// Ready to be rendered; its pictures are those of [`FormulaPictures`].
 #[track_caller]
 pub fn compile(desc: &SceneDesc) -> Scene {
-    match desc.compile(&NoAssets, &CompileOptions::default()) {
+    match desc.compile(&FormulaPictures, &CompileOptions::default()) {
         Ok(compiled) => compiled.scene,
         Err(error) => panic!("{error}\nin {desc:#?}"),
     }

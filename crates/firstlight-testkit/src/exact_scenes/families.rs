@@ -21,9 +21,11 @@ pub(super) enum Family {
     Hard,
     /// Small plates with checkers, of which the rims are seen.
     Rims,
+    /// Metals and dielectrics.
+    Surfaces,
 }
 
-/// How many seeds each has.
+/// How many seeds each of the first has.
 const SEEDS: u64 = 75;
 
 const FAMILIES: [Family; 8] = [
@@ -38,9 +40,13 @@ const FAMILIES: [Family; 8] = [
 ];
 
 impl Family {
-    /// That of a seed counted from the first that has one; the last goes on for ever.
-    pub fn of(seed: u64) -> Family {
-        FAMILIES[((seed / SEEDS) as usize).min(FAMILIES.len() - 1)]
+    /// That of a seed; `None` of the first thousand.
+    pub fn of(seed: u64) -> Option<Family> {
+        if seed >= SURFACES {
+            return Some(Family::Surfaces);
+        }
+        let index = (seed.checked_sub(SMOOTH)? / SEEDS) as usize;
+        Some(FAMILIES[index.min(FAMILIES.len() - 1)])
     }
 
     /// Whether there are lights to be integrated.
@@ -58,6 +64,7 @@ impl Family {
             Family::Specks => specks(random),
             Family::Hard => hard(random),
             Family::Rims => rims(random),
+            Family::Surfaces => surfaces::surfaces(random),
         }
     }
 }

@@ -21,6 +21,7 @@ mod many_lights;
 mod masks;
 mod materials;
 mod meshes;
+mod metals;
 mod motion;
 mod near;
 mod normals;

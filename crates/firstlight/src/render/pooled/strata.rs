@@ -237,7 +237,9 @@ impl<'a> Strata<'a> {
             return true;
         }
         if is_raised {
-            self.level += 1;
+            // Where what is sent most has made all strata smaller than that, the largest there are
+            let largest = self.blocks.iter().map(|block| block.level).min().unwrap_or(0);
+            self.level = self.level.max(largest) + 1;
             self.is_halved = true;
             self.surprises = Default::default();
         }
