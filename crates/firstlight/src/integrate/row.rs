@@ -77,7 +77,9 @@ pub(super) fn roots<S: Simd>(a: f32x16<S>, b: f32x16<S>, c: f32x16<S>) -> Roots<
     let simd = a.token();
     let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
     let least = (b.abs() + c.abs()) * 1e-12 + f32::MIN_POSITIVE;
-    let a = a.abs().simd_lt(least).select(least.copysign(a), a);
+    // The sign of a zero does not count: forms with a >= 0 are those that open beyond their roots
+    let tiny = a.simd_lt(zero).select(-least, least);
+    let a = a.abs().simd_lt(least).select(tiny, a);
     let discriminant = b * b - c * a;
     let root = discriminant.max(zero).sqrt();
     // -(b + sign(b) root): nothing cancels
