@@ -283,10 +283,10 @@ fn evaluate_nodes<S: Simd>(
 fn sum<S: Simd>(simd: S, values: &[[LaneNumbers; NODES]; NODES]) -> (f32x16<S>, [[f32x16<S>; 2]; 2]) {
     let zero = simd.splat_f32x16(0.0);
     let (mut sum, mut tails) = (zero, [[zero; 2]; 2]);
-    for j in 0..NODES {
+    for (j, row) in values.iter().enumerate() {
         let (mut total, mut c, mut d) = (zero, [zero; 2], [zero; 2]);
-        for i in 0..NODES {
-            let [in_row, in_column] = [values[j][i], values[i][j]].map(|value| f32x16::simd_from(simd, value));
+        for (i, value) in row.iter().enumerate() {
+            let [in_row, in_column] = [value, &values[i][j]].map(|value| f32x16::simd_from(simd, *value));
             total += in_row * RULE.weights[i];
             for k in 0..2 {
                 c[k] += in_row * RULE.tails[k][i];
