@@ -360,8 +360,9 @@ mod tests {
         let hint = "add a light of the same shape, with visible = false, where they should light the scene";
         let text = "material \"a\" and another one emit light that is seen, and that lights nothing";
         // Without lights they are not black either
-        for light in [LIGHT, ""] {
-            assert_eq!(said(&format!("{BALL}{light}{shining}")), [format!("s.toml:1:1: material: {text}; {hint}")]);
+        for (light, line) in [(LIGHT, 8), ("", 6)] {
+            let expected = format!("s.toml:{line}:2: material: {text}; {hint}");
+            assert_eq!(said(&format!("{BALL}{light}{shining}")), [expected]);
         }
     }
 
