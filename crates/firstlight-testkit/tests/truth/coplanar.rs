@@ -249,7 +249,7 @@ fn of_two_surfaces_in_one_plane_neither_shadows_the_other() {
                 // Every pair under half of the lights, over the three poses
                 let of = random.pick(&lights);
                 let text = [
-                    camera_at(pose, [0.0, 3.0, 0.01], [0.0, 0.0, 0.0], 12),
+                    camera_at(pose, [0.0, 3.0, 0.01], [0.0, 0.0, 0.0], 8),
                     flat(floor, pose, [0.2, 0.1], 0.0, 1.0, 1.5, SHADOWS, 0),
                     flat(coin, pose, [0.0; 2], 0.0, 1.0, 0.6, SHADOWS, 1),
                     light(of, pose, [1.0, 2.0], 2.5, 0.3, ""),

@@ -164,7 +164,7 @@ fn lights_taken_for_one_do_not_show() {
 
 #[test]
 fn area_lights_taken_for_one_do_not_show() {
-    hold(10..14, 100, Kinds::Areas);
+    hold(10..13, 100, Kinds::Areas);
     hold(30..32, 1200, Kinds::Areas);
 }
 
