@@ -130,7 +130,7 @@ impl Row {
             sobol_worst: number(11)?,
             seconds: number(12)?,
             commit: (*words.get(13)?).to_owned(),
-            outside: (*words.get(14)?).to_owned(),
+            outside: words.get(14)?.replace(';', ","),
         })
     }
 
@@ -186,7 +186,7 @@ fn converged(seed: u64, desc: &SceneDesc, options: &Options) -> Converged {
         return truth;
     };
     if truth.open() > 0 && cap < options.cap {
-        truth.go_on(cap + 1, options.cap);
+        truth.settle(cap + 1, options.cap);
         kept::write(&path, desc, options.cap, &truth);
     }
     truth

@@ -229,12 +229,6 @@ impl Converged {
         converged
     }
 
-    /// Asks sets of 2^`first` to 2^`cap` points for the pixels that are still open.
-    #[track_caller]
-    pub fn go_on(&mut self, first: u32, cap: u32) {
-        self.settle(first, cap);
-    }
-
     /// Nothing is known yet: every pixel is open.
     #[track_caller]
     pub(crate) fn unknown(desc: &SceneDesc) -> Self {
@@ -260,7 +254,7 @@ impl Converged {
     /// Asks sets of 2^`first` points, then of twice as many and so on up to 2^`cap`, for the pixels that are open,
     /// until they agree.
     #[track_caller]
-    fn settle(&mut self, first: u32, cap: u32) {
+    pub fn settle(&mut self, first: u32, cap: u32) {
         let count = self.pixels.len();
         let mut before = vec![false; count];
         for level in first..=cap {

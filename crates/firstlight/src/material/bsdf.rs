@@ -102,11 +102,11 @@ impl MeanLobe {
             *self = MeanLobe::new(lobe);
             return;
         }
-        if self.is_same && lobe == self.one {
-            self.count += 1.0;
-            return;
-        }
         if self.is_same {
+            if lobe == self.one {
+                self.count += 1.0;
+                return;
+            }
             self.sum = self.sum.map(|number| number * self.count);
             self.is_same = false;
         }
