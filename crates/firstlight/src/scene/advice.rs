@@ -197,15 +197,16 @@ fn advise_light(cx: &mut CompileContext, scene: &Scene) {
 /// Advises that surfaces that emit light are no lights.
 fn advise_emission(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc) {
     let is_emissive = |(material, _): &(&Material, _)| !material.common.emissive.factor.is_black();
-    let mut emissive = scene.materials.iter().zip(&desc.materials).filter(is_emissive).map(|(_, (name, _))| name);
-    let Some(first) = emissive.next() else { return };
-    let names = match emissive.count() {
-        0 => format!("material {first:?} emits"),
-        1 => format!("material {first:?} and another one emit"),
-        more => format!("material {first:?} and {more} others emit"),
+    let mut emissive = scene.materials.iter().zip(&desc.materials).filter(is_emissive).map(|(_, of)| of);
+    let Some((name, first)) = emissive.next() else { return };
+    let materials = match emissive.count() {
+        0 => "the material emits".to_owned(),
+        1 => "this material and another one emit".to_owned(),
+        more => format!("this material and {more} others emit"),
     };
     let hint = "add a light of the same shape, with visible = false, where they should light the scene";
-    cx.advise("material", format!("{names} light that is seen, and that lights nothing"), Some(hint));
+    let path = format!("material.{}.{name}.emissive", first.kind());
+    cx.advise(&path, format!("{materials} light that is seen, and that lights nothing"), Some(hint));
 }
 
 /// Advises that nothing is in the picture.
@@ -358,10 +359,10 @@ mod tests {
         let shining = "[material.phong.a]\nemissive = 2\n[material.unlit.b]\nemissive = [0, 1, 0]\n\
                        [material.unlit.c]\ncolor = 3\n";
         let hint = "add a light of the same shape, with visible = false, where they should light the scene";
-        let text = "material \"a\" and another one emit light that is seen, and that lights nothing";
+        let text = "this material and another one emit light that is seen, and that lights nothing";
         // Without lights they are not black either
-        for (light, line) in [(LIGHT, 8), ("", 6)] {
-            let expected = format!("s.toml:{line}:2: material: {text}; {hint}");
+        for (light, line) in [(LIGHT, 9), ("", 7)] {
+            let expected = format!("s.toml:{line}:12: material.phong.a.emissive: {text}; {hint}");
             assert_eq!(said(&format!("{BALL}{light}{shining}")), [expected]);
         }
     }
