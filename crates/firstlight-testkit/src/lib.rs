@@ -3,7 +3,8 @@
 //!
 //! [`scenes`] builds scenes and looks at them; [`random`] and [`exact_scenes`] make them up, with [`pictures`] by
 //! formula; [`converged`] knows how they look when nothing is left to chance, with [`graded`] points where a light is
-//! near and [`kept`] files where that took long; [`hostile_text`], [`hostile_mesh`] and [`hostile_picture`] are what fuzzing holds the readers to.
+//! near and [`kept`] files where that took long; [`hostile_text`], [`hostile_mesh`] and [`hostile_picture`] are what
+//! fuzzing holds the readers to.
 
 #![allow(missing_docs, reason = "tests say what they build by its name")]
 
