@@ -46,6 +46,9 @@ fn slopes(u: f64, v: f64) -> [f64; 2] {
     [du * HEIGHT, dv * HEIGHT]
 }
 
+/// The slope of a map that bends all normals by as much, towards -u.
+const TILT: f64 = 0.75;
+
 fn files() -> MemoryAssets {
     let mirrored = |u: f64, v: f64| {
         let [du, dv] = slopes(1.0 - u, v);
@@ -61,6 +64,7 @@ fn files() -> MemoryAssets {
         ("mirrored.png", normals(mirrored)),
         ("rough.png", normals(rough)),
         ("height.png", texels(|u, v| [0.5 * wave(u, v)[0] + 0.5; 3])),
+        ("tilt.png", normals(|_, _| [TILT, 0.0])),
         ("flat.png", texels(|_, _| [128.0 / 255.0, 128.0 / 255.0, 1.0])),
         ("gloss.png", texels(|u, v| [0.5 + 0.3 * wave(u, v)[0]; 3])),
     ];
@@ -76,6 +80,8 @@ const TEXTURES: &str = r#"
     file = "rough.png"
     [texture.image.height]
     file = "height.png"
+    [texture.image.tilt]
+    file = "tilt.png"
     [texture.image.flat]
     file = "flat.png"
     [texture.image.gloss]
@@ -174,6 +180,99 @@ fn a_flat_map_is_nearly_none_and_a_factor_of_0_is_none() {
         ] {
             assert_eq!(square(&format!("{more}\n{none}"), SQUARE), plain);
         }
+    }
+}
+
+#[test]
+fn light_fades_where_the_surface_turns_away_from_it() {
+    // A square from above, whose normals all lean towards a light that sinks
+    for lobe in ["", "specular = 0.3\nshininess = 20", "specular = 0.3\nshininess = 20\nnormal_fix = \"none\""] {
+        for height in [2.0f64, 0.5, 0.1, 0.02, 0.002] {
+            let text = format!(
+                "[render]\nwidth = 8\nheight = 8\n[camera]\nposition = [0.5, 3, -0.5]\nlook_at = [0.5, 0, -0.5]\n\
+                 up = [0, 0, -1]\nprojection = \"orthographic\"\nheight = 1\n[[light.directional]]\n\
+                 direction = [1, {}, 0]\n[material.blinn-phong.square]\ndiffuse = 0.5\nnormal_map = \"tilt\"\n\
+                 {lobe}\n{SQUARE}\nmaterial = \"square\"\n",
+                -height
+            );
+            let found = picture(&scene(&text), &every_ray()).pixels[8 * 4 + 4][0];
+            let length = (1.0 + height * height).sqrt();
+            // n = (-0.6, 0.8, 0), wi = (-1, height, 0) / length, wo = (0, 1, 0)
+            let (cos_i, up) = ((0.6 + 0.8 * height) / length, height / length);
+            let (hx, hy) = (-1.0 / length, up + 1.0);
+            let cos_h = (0.8 * hy - 0.6 * hx) / (hx * hx + hy * hy).sqrt();
+            let alpha2 = 0.125 * TILT * TILT;
+            let tan2 = 1.0 / (height * height);
+            let (mut base, mut highlight) = (0.5 * cos_i, 0.0);
+            if !lobe.is_empty() {
+                highlight = 0.3 * pxfm::f_pow(cos_h, 20.0);
+            }
+            if !lobe.contains("none") {
+                let let_through = 2.0 / (1.0 + (1.0 + alpha2 * tan2).sqrt());
+                (base, highlight) = (base * let_through, highlight * let_through);
+            }
+            // A strength is an irradiance
+            let expected = (base + highlight) / std::f64::consts::PI;
+            // The slopes of the picture are those of its 16 bits
+            assert!(
+                (f64::from(found) - expected).abs() < 2e-4 * expected + 2e-6,
+                "{lobe} {height}: {found} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_terminator_of_a_mapped_ball_is_soft() {
+    let row = |fix: &str| {
+        let text = format!(
+            "[render]\nwidth = 200\nheight = 200\n[camera]\nposition = [0, 0, 4.2]\nlook_at = [0, 0, 0]\n\
+             fov_y_deg = 30\n[[light.point]]\nposition = [-8, 0, 1]\nstrength = 60\n\
+             [material.metallic-roughness.metal]\nmetallic = 1\nroughness = 0.5\nnormal_map = \"tilt\"\n\
+             normal_fix = \"{fix}\"\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"metal\"\n"
+        );
+        let pixels = picture(&scene(&text), &every_ray()).pixels;
+        let row: Vec<f32> = pixels[100 * 200 + 80..100 * 200 + 120].iter().map(|pixel| pixel[0]).collect();
+        let step = row.windows(2).map(|two| (two[0] - two[1]).abs()).fold(0.0, f32::max);
+        step / row.iter().copied().fold(0.0, f32::max)
+    };
+    let (soft, hard) = (row("raise"), row("none"));
+    assert!(soft < 0.15 && hard > 0.4, "{soft} {hard}");
+}
+
+#[test]
+fn integrated_light_on_bent_normals_is_that_of_many_points() {
+    // Lights that the surface cuts, on normals that lean towards them and away, of each kind of lobe
+    for (k, material) in [
+        "phong.square]\ndiffuse = 0.6",
+        "phong.square]\ndiffuse = 0.4\nspecular = 0.4\nshininess = 12",
+        "metallic-roughness.square]\nroughness = 0.5",
+        "metallic-roughness.square]\nmetallic = 1\nroughness = 0.4",
+        "metallic-roughness.square]\nclearcoat = 1\nclearcoat_roughness = 0.4\nclearcoat_normal_map = \"wave\"",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let of = |samples: &str| {
+            let text = format!(
+                "[render]\nwidth = 24\nheight = 24\nantialiasing = 1\n{samples}\n[camera]\nposition = [0.5, 1.5, 1]\n\
+                 look_at = [0.5, 0, -0.5]\nfov_y_deg = 32\n[[light.rectangle]]\ncenter = [-0.8, 0.1, -0.4]\n\
+                 look_at = [0.5, 0.1, -0.5]\nsize = [0.8, 0.8]\nstrength = 3\n[[light.sphere]]\n\
+                 center = [1.5, 0.05, -0.7]\nradius = 0.2\nstrength = 6\n[material.{material}\n\
+                 normal_map = \"wave\"\n{SQUARE}\nmaterial = \"square\"\n",
+            );
+            picture(&scene(&text), &every_ray()).pixels
+        };
+        let (exact, sampled) = (of(""), of("samples = 4096"));
+        let encode =
+            |c: f32| 255.0 * if c <= 0.0031308 { 12.92 * c } else { 1.055 * pxfm::f_powf(c, 1.0 / 2.4) - 0.055 };
+        let steps = |one: &[f32; 4], other: &[f32; 4]| {
+            (0..3).map(|c| (encode(one[c].min(1.0)) - encode(other[c].min(1.0))).abs()).fold(0.0, f32::max)
+        };
+        let mut off: Vec<f32> = exact.iter().zip(&sampled).map(|(one, other)| steps(one, other)).collect();
+        off.sort_by(f32::total_cmp);
+        let (most, worst) = (off[off.len() * 99 / 100], off[off.len() - 1]);
+        assert!(most < 0.8 && worst < 1.5, "{k}: {most} {worst}");
     }
 }
 

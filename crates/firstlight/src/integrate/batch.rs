@@ -56,6 +56,8 @@ pub(crate) enum FrameNumber {
     /// The exponent of the lobe.
     LobeNumber0,
     LobeNumber1,
+    /// alpha of the shadowing by bumps.
+    Bump,
     /// The first and last x and y of the light's square.
     X0,
     X1,
@@ -92,7 +94,7 @@ impl LightFrame16 {
             p.x, p.y, p.z, l0.x, l0.y, l0.z, a.x, a.y, a.z, b.x, b.y, b.z,
             v.fa, v.la, v.skew, v.fb, v.lb, v.height, v.facing, mirror.x, mirror.y, mirror.z,
             v.cos.c, v.cos.x, v.cos.y, v.horizon.c, v.horizon.x, v.horizon.y, v.out.c, v.out.x, v.out.y, v.cos_o,
-            lobe[0], lobe[1],
+            lobe[0], lobe[1], point.bump_shadowing.alpha,
             v.x[0], v.x[1], v.y[0], v.y[1], v.origin[0], v.origin[1],
             v.ratio, v.behind2, v.measure,
         ];
@@ -120,6 +122,7 @@ impl LightFrame16 {
             let numbers = points[lane.min(points.len() - 1)].bsdf.lobe.numbers();
             [self.0[LobeNumber0 as usize][lane], self.0[LobeNumber1 as usize][lane]] = numbers;
         }
+        self.0[Bump as usize] = point_numbers(simd, points, |point| point.bump_shadowing.alpha).to_array();
         let [a, b, n] = [light.a, light.b, light.n].map(|v| Vec3x16::splat(simd, v));
         let l0 = Exact::new(light.c).seen_from(simd, p);
         let side = -n.dot(l0);

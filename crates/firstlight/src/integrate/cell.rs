@@ -14,6 +14,7 @@ use super::batch::{
 use super::tolerance::TOLERANCE;
 use crate::material::LobeKind;
 use crate::math::{LANES, sin_cos};
+use crate::shape::BumpShadowing;
 
 /// Moments of a light: of the cosine, and of the lobe.
 pub(crate) use crate::material::MOMENTS;
@@ -204,6 +205,9 @@ fn evaluate_nodes<S: Simd>(
     let zero = splat(0.0);
     let height2 = height * height;
     let lobes = members.lobes(simd, lobe);
+    let bump = members.lanes(simd, Bump);
+    let is_bumpy = bump.simd_gt(zero).any_true();
+    let horizon = members.linear(simd, [HorizonC, HorizonX, HorizonY]);
     let is_sphere = falloff == AreaWeight::Sphere;
     let (ratio, behind2) = (members.lanes(simd, Ratio), members.lanes(simd, Behind2));
     // Distance along the way to the middle of a sphere, and the power of the point with respect to it
@@ -238,7 +242,7 @@ fn evaluate_nodes<S: Simd>(
             let along = x * la + along_row;
             let inverse = 1.0 / (along * along + rest).sqrt();
             match falloff {
-                AreaWeight::Constant => {}
+                AreaWeight::Constant => weights[i] = splat(1.0),
                 AreaWeight::Physical => weights[i] = inverse * inverse * (inverse * height),
                 AreaWeight::Around { .. } => {
                     // The square of the way to the sphere, over its cosine there: t^2 |l|^2 and root / (|l| radius)
@@ -260,6 +264,9 @@ fn evaluate_nodes<S: Simd>(
             }
             cos_i[i] = (x * cos.x + cos_row) * inverse;
             cos_io[i] = (x * out.x + out_row) * inverse;
+            if is_bumpy {
+                weights[i] *= BumpShadowing::factor_lanes(bump, horizon.at(x, y) * inverse);
+            }
         }
         lobes.for_each_moment(
             cos_i,

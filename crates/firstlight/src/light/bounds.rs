@@ -56,6 +56,8 @@ pub(crate) struct ReceiverBounds {
     pub wo: DirectionCone,
     /// The lobe that all of them have.
     pub lobe: Lobe,
+    /// Whether bumps shadow any of them: nothing bounds how fast light falls there.
+    pub is_bumpy: bool,
 }
 
 /// Bounds of what a light of strength 1 contributes to the receivers.
@@ -210,6 +212,9 @@ impl LightBounds {
         }
         if max_emission == 0.0 {
             return nothing;
+        }
+        if receivers.is_bumpy {
+            (min_emission, is_smooth) = (0.0, false);
         }
         let min_distance = if is_directional {
             f32::INFINITY

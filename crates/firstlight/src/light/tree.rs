@@ -14,7 +14,7 @@ use super::bounds::{ContributionBounds, EmissionProfile, LightBounds, MAX_CONTRI
 use super::samples::mix;
 use super::{Area, Light};
 use crate::color::Rgb;
-use crate::material::{Colors, Lobe, Moments, PerMoment};
+use crate::material::{Colors, Moments, PerMoment, ShadingPoint};
 use crate::math::{DMat3, DVec3, Mat3, Vec3};
 
 /// Up to so many lights are all evaluated at every point; a scene with more has a light tree.
@@ -279,8 +279,8 @@ impl LightNode {
     /// What its lights, taken for one at the centroid, contribute to a point where nothing occludes them: diffuse and
     /// specular, before the colours of the surface.
     #[inline(always)]
-    pub fn estimate(&self, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> Colors {
-        let one = |channel: usize| self.channel_estimate(channel, p, ns, wo, lobe);
+    pub fn estimate(&self, point: &ShadingPoint) -> Colors {
+        let one = |channel: usize| self.channel_estimate(channel, point);
         if self.is_gray {
             return one(0).map(|moment| self.power * moment);
         }
@@ -291,7 +291,8 @@ impl LightNode {
     }
 
     #[inline(always)]
-    fn channel_estimate(&self, channel: usize, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> Moments {
+    fn channel_estimate(&self, channel: usize, point: &ShadingPoint) -> Moments {
+        let ShadingPoint { p, ns, wo, ref bsdf, .. } = *point;
         let centroid = self.centroid[channel];
         let l = if self.bounds.profile == EmissionProfile::Directional { centroid } else { centroid - p };
         let one = 1.0 / l.length().max(f32::MIN_POSITIVE);
@@ -315,12 +316,13 @@ impl LightNode {
             // cos / d^2
             _ => (two, (cos + two * (cos * (7.5 * deep - 1.5 * trace) - 3.0 * across)) * two),
         };
-        lobe.moments_around(diffuse.max(0.0), cos.max(0.0), ns.dot(wo), wo.dot(d), weight)
+        let let_through = point.bump_shadowing.factor(point.horizon.dot(d));
+        bsdf.lobe.moments_around(diffuse.max(0.0), cos.max(0.0), ns.dot(wo), wo.dot(d), weight) * let_through
     }
 
     /// The estimate for a power of 1, of a light without colour.
-    pub fn unit_estimate(&self, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> Moments {
-        self.channel_estimate(0, p, ns, wo, lobe)
+    pub fn unit_estimate(&self, point: &ShadingPoint) -> Moments {
+        self.channel_estimate(0, point)
     }
 
     /// What a light of strength 1 at the centroid contributes at `p`, before the cosine at the surface.

@@ -11,6 +11,7 @@ use crate::describe::node::Node;
 use crate::describe::read::Reader;
 use crate::describe::{ColorDesc, TableInfo, TextValue, Value, table};
 use crate::math::Vec3;
+use crate::shape::SurfaceInteraction;
 
 table! {
     /// Ambient light that changes with the direction: from a direction d it is down + (up - down) (1 + d.y) / 2.
@@ -139,21 +140,39 @@ impl Ambient {
 /// The directions at a surface that decide its answer to ambient light.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ViewGeometry {
-    /// Shading normal.
+    /// Shading normal of the diffuse part.
     pub ns: Vec3,
+    /// That of the highlight.
+    pub lobe_ns: Vec3,
     /// To the viewer.
     pub wo: Vec3,
 }
 
 impl ViewGeometry {
-    /// n.wo, 0 or more.
-    pub fn cos_o(&self) -> f32 {
-        self.ns.dot(self.wo).max(0.0)
+    /// With one normal for both parts.
+    pub fn new(ns: Vec3, wo: Vec3) -> ViewGeometry {
+        ViewGeometry { ns, lobe_ns: ns, wo }
     }
 
-    /// The direction to the viewer, mirrored.
+    /// Of a surface below its coat.
+    #[inline(always)]
+    pub fn of(si: &SurfaceInteraction) -> ViewGeometry {
+        ViewGeometry { ns: si.ns, lobe_ns: si.lobe_ns, wo: si.wo }
+    }
+
+    /// Of the coat of a surface.
+    pub fn of_coat(si: &SurfaceInteraction) -> ViewGeometry {
+        ViewGeometry::new(si.coat_ns, si.wo)
+    }
+
+    /// n.wo of the highlight, 0 or more.
+    pub fn cos_o(&self) -> f32 {
+        self.lobe_ns.dot(self.wo).max(0.0)
+    }
+
+    /// The direction to the viewer, mirrored by the highlight.
     pub fn mirror(&self) -> Vec3 {
-        self.ns * (2.0 * self.ns.dot(self.wo)) - self.wo
+        self.lobe_ns * (2.0 * self.lobe_ns.dot(self.wo)) - self.wo
     }
 }
 

@@ -49,6 +49,17 @@ impl Bsdf {
         Bsdf { colors: self.colors * weight, ambient: self.ambient * weight, ..self }
     }
 
+    /// Its diffuse part alone, with the answer to ambient light.
+    pub(crate) fn diffuse_part(self) -> Bsdf {
+        Bsdf { colors: PerMoment([self.colors.0[0], Rgb::BLACK, Rgb::BLACK]), ..self }
+    }
+
+    /// Its highlight alone, without the answer to ambient light.
+    pub(crate) fn highlight_part(self) -> Bsdf {
+        let [_, one, two] = self.colors.0;
+        Bsdf { colors: PerMoment([Rgb::BLACK, one, two]), ambient: Rgb::BLACK, ..self }
+    }
+
     /// What leaves under such ambient light.
     #[inline(always)]
     pub(crate) fn base(&self, ambient: &Ambient) -> Rgb {
@@ -185,16 +196,10 @@ impl Lobe {
         }
     }
 
-    /// The moments of light of such a weight.
-    #[inline(always)]
-    pub(crate) fn moments(&self, cos_i: f32, cos_o: f32, cos_io: f32, weight: f32) -> Moments {
-        self.eval(cos_i, cos_o, cos_io) * weight
-    }
-
     /// The same where it is known what the cosine makes of many lights together.
     #[inline(always)]
     pub(crate) fn moments_around(&self, cosine: f32, cos_i: f32, cos_o: f32, cos_io: f32, weight: f32) -> Moments {
-        let mut moments = self.moments(cos_i, cos_o, cos_io, weight);
+        let mut moments = self.eval(cos_i, cos_o, cos_io) * weight;
         moments.0[0] = match self {
             Lobe::Ggx(lobe) => cosine * lobe.transmitted(cos_io),
             _ => cosine,

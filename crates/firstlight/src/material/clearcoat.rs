@@ -63,7 +63,7 @@ mod tests {
         let coat =
             Clearcoat { strength: Param::constant(strength), roughness: Param::constant(roughness), normals: None };
         let (ns, wo, wi) = (Vec3::Z, Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.48, 0.64, 0.6));
-        let view = ViewGeometry { ns, wo };
+        let view = ViewGeometry::new(ns, wo);
         let bsdf = coat.evaluate(&Ambient::default(), &view, 1.0, 0.0, |param| param.factor);
         let moments = bsdf.lobe.eval(wi.z, wo.z, wi.dot(wo));
         let found = f64::from(bsdf.colors.of(&moments).r);
@@ -82,9 +82,9 @@ mod tests {
     #[test]
     fn a_coat_at_a_grazing_angle_reflects_all_light() {
         let coat = Clearcoat { strength: Param::constant(1.0), roughness: Param::constant(0.0), normals: None };
-        let view = ViewGeometry { ns: Vec3::Z, wo: Vec3::X };
+        let view = ViewGeometry::new(Vec3::Z, Vec3::X);
         assert_eq!(coat.reflectance(&view, |param| param.factor), 1.0);
-        let behind = ViewGeometry { ns: Vec3::Z, wo: -Vec3::Z };
+        let behind = ViewGeometry::new(Vec3::Z, -Vec3::Z);
         assert_eq!(coat.reflectance(&behind, |param| param.factor), 1.0);
     }
 }

@@ -52,8 +52,8 @@ impl LobeLanes {
         }
     }
 
-    /// Calls `put` with the number of each moment that the lobe has and its values: [`Lobe::moments`] in so many times
-    /// sixteen lanes, with the same bits.
+    /// Calls `put` with the number of each moment that the lobe has and its values: [`Lobe::eval`] times `weight` in so
+    /// many times sixteen lanes, with the same bits.
     #[inline(always)]
     pub fn for_each_moment<S: Simd, const N: usize>(
         &self,

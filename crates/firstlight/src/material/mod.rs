@@ -99,7 +99,7 @@ impl Material {
     /// The material in numbers at one surface, under such ambient light.
     #[inline(always)]
     pub fn bsdf(&self, si: &SurfaceInteraction, textures: &[Texture], ambient: &Ambient) -> Bsdf {
-        let ambient = self.varies_with_view(ambient).then_some((ambient, ViewGeometry { ns: si.ns, wo: si.wo }));
+        let ambient = self.varies_with_view(ambient).then_some((ambient, ViewGeometry::of(si)));
         let color = |param: &Param<Rgb>| param.color(si, textures) * si.color;
         // Data is filtered over the pixel's footprint, so that a lobe hardly varies within a pixel
         let number = |param: &Param<f32>| param.number(si, textures, si.footprints_per_pixel);
@@ -115,20 +115,13 @@ impl Material {
         let Reflection::MetallicRoughness(material) = &self.reflection else { return None };
         let number = |param: &Param<f32>| param.number(si, textures, si.footprints_per_pixel);
         let occlusion = number(&material.occlusion).clamp(0.0, 1.0);
-        Some(material.coat?.evaluate(
-            ambient,
-            &ViewGeometry { ns: si.coat_ns, wo: si.wo },
-            occlusion,
-            si.coat_slope_variance,
-            number,
-        ))
+        Some(material.coat?.evaluate(ambient, &ViewGeometry::of_coat(si), occlusion, si.coat_slope_variance, number))
     }
 
     /// The part of light that the clear coat reflects towards the viewer, and takes from what is below it.
     fn coat_reflectance(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Option<f32> {
         let coat = self.coat()?;
-        let view = ViewGeometry { ns: si.coat_ns, wo: si.wo };
-        Some(coat.reflectance(&view, |param| param.number(si, textures, si.footprints_per_pixel)))
+        Some(coat.reflectance(&ViewGeometry::of_coat(si), |param| param.number(si, textures, si.footprints_per_pixel)))
     }
 
     /// Its clear coat.

@@ -1,10 +1,10 @@
 //! A point of a surface, as lights need it.
 
-use super::{Ambient, Bsdf};
+use super::{Ambient, Bsdf, Moments};
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
 use crate::math::{ErrorBound, Facet, Vec3};
-use crate::shape::SurfaceInteraction;
+use crate::shape::{BumpShadowing, SurfaceInteraction};
 
 /// A point of a surface to be lit: where it is, what it reflects, and the footprint that it represents. World space,
 /// metres; all directions are unit vectors.
@@ -21,6 +21,8 @@ pub(crate) struct ShadingPoint {
     pub facet: Facet,
     /// Shading normal.
     pub ns: Vec3,
+    /// Of the bumps that bend it.
+    pub bump_shadowing: BumpShadowing,
     /// To the viewer.
     pub wo: Vec3,
     pub surface: SurfaceId,
@@ -54,6 +56,7 @@ impl ShadingPoint {
             ng: n,
             facet: Facet::NONE,
             ns: n,
+            bump_shadowing: BumpShadowing::default(),
             wo,
             surface: SurfaceId(0),
             receives_shadow: true,
@@ -70,15 +73,30 @@ impl ShadingPoint {
     /// Where a ray meets a surface, under `ambient` light.
     #[inline(always)]
     pub fn of(si: &SurfaceInteraction, bsdf: &Bsdf, ambient: &Ambient) -> ShadingPoint {
-        let SurfaceInteraction { lit_from, error, horizon, ng, facet, ns, wo, surface, receives_shadow, .. } = *si;
+        let SurfaceInteraction { lit_from, error, horizon, ng, facet, ns, wo, .. } = *si;
+        let SurfaceInteraction { bump_shadowing, surface, receives_shadow, .. } = *si;
         let base = bsdf.base(ambient);
         let point = ShadingPoint::new(lit_from, error, ns, wo, bsdf);
-        ShadingPoint { horizon, ng, facet, surface, receives_shadow, base, ..point }
+        ShadingPoint { bump_shadowing, horizon, ng, facet, surface, receives_shadow, base, ..point }
     }
 
-    /// The same of the clear coat, which has a normal of its own.
+    /// The same of a highlight that has a normal of its own.
+    pub fn of_highlight(si: &SurfaceInteraction, bsdf: &Bsdf, ambient: &Ambient) -> ShadingPoint {
+        ShadingPoint { ns: si.lobe_ns, ..ShadingPoint::of(si, bsdf, ambient) }
+    }
+
+    /// The same of the clear coat.
     pub fn of_coat(si: &SurfaceInteraction, bsdf: &Bsdf, ambient: &Ambient) -> ShadingPoint {
-        ShadingPoint { ns: si.coat_ns, ..ShadingPoint::of(si, bsdf, ambient) }
+        let bump_shadowing = si.coat_bump_shadowing;
+        ShadingPoint { ns: si.coat_ns, bump_shadowing, ..ShadingPoint::of(si, bsdf, ambient) }
+    }
+
+    /// The moments of light from `l` away, above the horizon, of such a weight. `inverse_distance` is 1 / |l|.
+    #[inline(always)]
+    pub fn moments(&self, l: Vec3, inverse_distance: f32, weight: f32) -> Moments {
+        let (cos_i, cos_io) = (self.ns.dot(l) * inverse_distance, self.wo.dot(l) * inverse_distance);
+        let weight = weight * self.bump_shadowing.factor(self.horizon.dot(l) * inverse_distance);
+        self.bsdf.lobe.eval(cos_i, self.ns.dot(self.wo), cos_io) * weight
     }
 
     /// Whether the closed form is given up where it costs too much.

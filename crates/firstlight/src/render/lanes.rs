@@ -164,6 +164,7 @@ fn gather_area<S: Simd>(
         if let Some(left) = left {
             weight *= left;
         }
+        weight = point.bump_shadowing.shadowed(weight, horizon.dot(l) * inverse_distance);
         let cos_i = height * inverse_distance;
         let cos_io = wo.dot(l) * inverse_distance;
         lobe.for_each_moment(

@@ -119,8 +119,7 @@ impl PixelSum {
         }
     }
 
-    /// Adds what a surface emits, and its ambient light, times `weight`; the same of its coat. Calls `lit` with the
-    /// shading points of both.
+    /// Adds what a surface emits, and its ambient light, times `weight`. Calls `lit` with its shading points.
     #[inline(always)]
     fn see_surface(
         &mut self,
@@ -132,7 +131,7 @@ impl PixelSum {
         self.terms.emission.add(scene.emission(si), weight.into());
         // Evaluate the textures of the material
         let point = ShadingPoint::of(si, &scene.bsdf(si).weighted(weight), &scene.ambient);
-        for point in iter::once(point).chain(scene.coat_point(si, weight)) {
+        for point in iter::once(point).chain(scene.further_points(si, weight)) {
             self.terms.ambient += point.base;
             lit(self, point);
         }

@@ -33,17 +33,15 @@ pub(super) struct Facing<'a> {
     end: LightEnd,
     point: &'a ShadingPoint,
     from: Viewpoint,
-    cos_o: f32,
     floor: f32,
 }
 
 impl<'a> Facing<'a> {
     pub fn new(scene: &'a Scene, index: usize, point: &'a ShadingPoint) -> Self {
         let light = &scene.lights[index];
-        let cos_o = point.ns.dot(point.wo);
         let floor = light.floor(point.p, point.error, point.horizon);
         let end = scene.light_end(LightId(index as u32));
-        Facing { scene, light, end, point, from: Viewpoint::of(point), cos_o, floor }
+        Facing { scene, light, end, point, from: Viewpoint::of(point), floor }
     }
 
     /// The moments of one point of the light, in the direction `to`; `None` where nothing arrives. `sample` computes
@@ -58,8 +56,7 @@ impl<'a> Facing<'a> {
         let point = self.point;
         counts.shadow_rays += 1;
         // Light from below the surface does not count, nor what rounding alone may have lifted above it
-        let height = point.ns.dot(to.l);
-        if !(point.horizon.dot(to.l) > self.floor && height > 0.0) {
+        if !(point.horizon.dot(to.l) > self.floor && point.ns.dot(to.l) > 0.0) {
             return None;
         }
         // The emission in this direction
@@ -80,8 +77,6 @@ impl<'a> Facing<'a> {
             counts.shadow_rays_skipped += 1;
         }
         // Its lobe
-        let cos_i = height * sample.inverse_distance;
-        let cos_io = point.wo.dot(to.l) * sample.inverse_distance;
-        Some(point.bsdf.lobe.moments(cos_i, self.cos_o, cos_io, sample.weight * left))
+        Some(point.moments(to.l, sample.inverse_distance, sample.weight * left))
     }
 }

@@ -45,6 +45,7 @@ pub use world::{CameraHit, SurfacePoint};
 
 use std::sync::Arc;
 
+use arrayvec::ArrayVec;
 use fearless_simd::Level;
 
 use crate::camera::Camera;
@@ -218,18 +219,27 @@ impl Scene {
         self.time
     }
 
-    /// The material at a surface, in numbers.
+    /// The material at a surface, in numbers, but for what has [points of its own](Self::further_points).
     #[inline(always)]
     pub(crate) fn bsdf(&self, si: &SurfaceInteraction) -> Bsdf {
-        self.materials[si.material.index()].bsdf(si, &self.textures, &self.ambient)
+        let bsdf = self.materials[si.material.index()].bsdf(si, &self.textures, &self.ambient);
+        if si.lobe_ns == si.ns { bsdf } else { bsdf.diffuse_part() }
     }
 
-    /// The shading point of the clear coat of a surface, of which such a part of a ray is seen: it is lit beside the
-    /// [material](Self::bsdf).
+    /// The shading points of the highlight of a surface, where its normal is another one, and of the clear coat; of
+    /// which such a part of a ray is seen. They are lit beside the [material](Self::bsdf).
     #[inline(always)]
-    pub(crate) fn coat_point(&self, si: &SurfaceInteraction, weight: f32) -> Option<ShadingPoint> {
-        let bsdf = self.materials[si.material.index()].coat_bsdf(si, &self.textures, &self.ambient)?;
-        Some(ShadingPoint::of_coat(si, &bsdf.weighted(weight), &self.ambient))
+    pub(crate) fn further_points(&self, si: &SurfaceInteraction, weight: f32) -> ArrayVec<ShadingPoint, 2> {
+        let material = &self.materials[si.material.index()];
+        let mut points = ArrayVec::new();
+        if si.lobe_ns != si.ns {
+            let bsdf = material.bsdf(si, &self.textures, &self.ambient).highlight_part();
+            points.push(ShadingPoint::of_highlight(si, &bsdf.weighted(weight), &self.ambient));
+        }
+        if let Some(bsdf) = material.coat_bsdf(si, &self.textures, &self.ambient) {
+            points.push(ShadingPoint::of_coat(si, &bsdf.weighted(weight), &self.ambient));
+        }
+        points
     }
 
     /// The radiance that the material at a surface emits.

@@ -5,7 +5,7 @@ use super::geometry::{At, Geometry, Hit, Placed, PlacedSpot, PlacedTarget, Surfa
 use crate::ids::SurfaceId;
 use crate::material::{NormalFix, NormalMapping};
 use crate::math::{Ray, Vec3};
-use crate::shape::{NormalFrame, RayDifferential, SolidHit, SurfaceInteraction};
+use crate::shape::{BumpShadowing, NormalFrame, RayDifferential, SolidHit, SurfaceInteraction};
 
 /// The least cosine between a bent normal and the direction to the viewer, and of the mirrored direction above the
 /// surface: below it a highlight at grazing angles is brighter than what is around it.
@@ -51,11 +51,23 @@ impl Scene {
         let (maps, coat) = (material.common.normals.as_ref(), material.coat_normals());
         (si.ns, si.slope_variance) = maps.and_then(|maps| bent(si, maps)).unwrap_or(smooth);
         (si.coat_ns, si.coat_slope_variance) = coat.and_then(|maps| bent(si, maps)).unwrap_or(smooth);
+        si.lobe_ns = si.ns;
         if raises && si.ns != si.ng {
-            si.ns = raised(si.ng, si.wo, si.ns, maps.is_some() && material.has_lobe());
+            si.ns = facing(si.ng, si.wo, si.ns);
+            si.lobe_ns = si.ns;
+            if maps.is_some() {
+                si.bump_shadowing = BumpShadowing::new(smooth.0, si.ns);
+                if material.has_lobe() {
+                    si.lobe_ns = mirroring(si.ng, si.wo, si.ns);
+                }
+            }
         }
         if raises && si.coat_ns != si.ng {
-            si.coat_ns = raised(si.ng, si.wo, si.coat_ns, coat.is_some());
+            si.coat_ns = facing(si.ng, si.wo, si.coat_ns);
+            if coat.is_some() {
+                si.coat_bump_shadowing = BumpShadowing::new(smooth.0, si.coat_ns);
+                si.coat_ns = mirroring(si.ng, si.wo, si.coat_ns);
+            }
         }
     }
 
@@ -71,26 +83,27 @@ impl Scene {
     }
 }
 
-/// A shading normal on the side of the geometric normal `ng`, that faces the viewer, and that mirrors the viewer above
-/// the surface where there is a highlight. `ng` faces the viewer. All are unit.
+/// The shading normal `ns` on the side of the geometric normal `ng`, turned as little as lets it face the viewer. `ng`
+/// faces the viewer. All are unit.
+fn facing(ng: Vec3, wo: Vec3, ns: Vec3) -> Vec3 {
+    let ns = if ns.dot(ng) < 0.0 { -ns } else { ns };
+    let cos_o = ns.dot(wo);
+    if cos_o >= LEAST_COS {
+        return ns;
+    }
+    let across = (ns - wo * cos_o).normalize_or_zero();
+    if across == Vec3::ZERO {
+        return ng;
+    }
+    across * (1.0 - LEAST_COS * LEAST_COS).sqrt() + wo * LEAST_COS
+}
+
+/// The normal of a highlight that mirrors the viewer above the surface, from a shading normal that faces the viewer.
 ///
 /// The mirrored direction r is where r.ng is the smaller of 0.01 and 0.9 (ng.wo) at least: the normal is turned towards
 /// ng in the plane of both, as little as that takes. Source: the rule that Cycles has, "Fix for black areas with
 /// specular bump maps", `ensure_valid_specular_reflection`, Blender 2.80.
-fn raised(ng: Vec3, wo: Vec3, ns: Vec3, has_lobe: bool) -> Vec3 {
-    let mut ns = if ns.dot(ng) < 0.0 { -ns } else { ns };
-    // The smallest turn after which the viewer sees its front
-    let cos_o = ns.dot(wo);
-    if cos_o < LEAST_COS {
-        let across = (ns - wo * cos_o).normalize_or_zero();
-        if across == Vec3::ZERO {
-            return ng;
-        }
-        ns = across * (1.0 - LEAST_COS * LEAST_COS).sqrt() + wo * LEAST_COS;
-    }
-    if !has_lobe {
-        return ns;
-    }
+fn mirroring(ng: Vec3, wo: Vec3, ns: Vec3) -> Vec3 {
     let height = ng.dot(wo);
     let least = LEAST_COS.min(0.9 * height);
     let mirrored = ns * (2.0 * ns.dot(wo)) - wo;
@@ -189,7 +202,10 @@ mod tests {
             let (tip, up) = crate::math::sin_cos_of_turns(f64::from(0.5 * lean));
             let ns = Vec3::new((tip * cos) as f32, (tip * sin) as f32, up as f32).normalize();
             for has_lobe in [false, true] {
-                let raised = raised(ng, wo, ns, has_lobe);
+                let mut raised = facing(ng, wo, ns);
+                if has_lobe {
+                    raised = mirroring(ng, wo, raised);
+                }
                 assert!((raised.length() - 1.0).abs() < 1e-4, "{wo} {ns} {raised}");
                 assert!(raised.dot(wo) > 0.0, "{wo} {ns} {raised}");
                 if !has_lobe {
@@ -205,6 +221,6 @@ mod tests {
             }
         }
         assert!(changed[0] > 1000 && changed[1] > changed[0], "{changed:?}");
-        assert_eq!(raised(ng, Vec3::new(0.6, 0.0, 0.8), Vec3::Z, true), Vec3::Z);
+        assert_eq!(mirroring(ng, Vec3::new(0.6, 0.0, 0.8), facing(ng, Vec3::new(0.6, 0.0, 0.8), Vec3::Z)), Vec3::Z);
     }
 }

@@ -8,7 +8,7 @@ use super::occluders::{Listed, ListedOccluders};
 use crate::color::Rgb;
 use crate::ids::{LightId, SurfaceId};
 use crate::math::{LightEnd, Ray, ShadowRay};
-use crate::shape::{RayDifferential, ShadowTerminator, ShapePoint, Sphere, SurfaceInteraction};
+use crate::shape::{BumpShadowing, RayDifferential, ShadowTerminator, ShapePoint, Sphere, SurfaceInteraction};
 
 pub use super::geometry::Hit;
 
@@ -189,6 +189,8 @@ impl Scene {
             error,
             ng,
             ns,
+            lobe_ns: ns,
+            bump_shadowing: BumpShadowing::default(),
             lit_from,
             horizon,
             facet,
@@ -199,6 +201,7 @@ impl Scene {
             slope_variance: 0.0,
             coat_ns: ns,
             coat_slope_variance: 0.0,
+            coat_bump_shadowing: BumpShadowing::default(),
             color,
             alpha,
             surface,

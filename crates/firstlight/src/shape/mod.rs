@@ -4,6 +4,7 @@
 //! the way of light.
 
 mod ball;
+mod bump_shadowing;
 mod cache;
 #[cfg(test)]
 pub(crate) mod check;
@@ -44,6 +45,7 @@ pub(crate) use surface::NormalFrame;
 pub use surface::{Footprint, RayDifferential, ShadowTerminator, SurfaceInteraction, UvEdge};
 pub use torus::TorusDesc;
 
+pub(crate) use bump_shadowing::BumpShadowing;
 pub(crate) use cache::{MeshFiles, key_of};
 pub(crate) use common::Common;
 pub(crate) use cover::{Cover, LightSeen};

@@ -1,5 +1,6 @@
 //! The surface at a hit, as materials and lights need it.
 
+use super::bump_shadowing::BumpShadowing;
 use crate::color::Rgb;
 use crate::describe::words;
 use crate::ids::{MaterialId, SurfaceId};
@@ -101,6 +102,10 @@ pub struct SurfaceInteraction {
     pub ng: Vec3,
     /// Shading normal: unit, turned together with `ng`.
     pub ns: Vec3,
+    /// That of the highlight, which a map may bend less.
+    pub(crate) lobe_ns: Vec3,
+    /// By the bumps that a map stands for.
+    pub(crate) bump_shadowing: BumpShadowing,
     /// Where light is gathered: `p`, or where it is lifted to from a facet that stands for something round; see
     /// [`ShadowTerminator`].
     pub lit_from: Vec3,
@@ -119,9 +124,10 @@ pub struct SurfaceInteraction {
     /// How much larger the variance of the slopes of microfacets is than the material says: that of the normals within
     /// the pixel.
     pub(crate) slope_variance: f32,
-    /// The shading normal of a clear coat, and the variance of slopes there: the maps of the material do not bend it.
+    /// The same of a clear coat, which the maps of the material do not bend.
     pub(crate) coat_ns: Vec3,
     pub(crate) coat_slope_variance: f32,
+    pub(crate) coat_bump_shadowing: BumpShadowing,
     /// Multiplies the colours of the material: linear Rec. 709.
     pub color: Rgb,
     /// Multiplies the alpha of the material: 0 to 1.

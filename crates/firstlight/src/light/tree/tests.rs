@@ -7,8 +7,8 @@ use super::super::{
 use super::*;
 use crate::context::CompileContext;
 use crate::describe::{ColorDesc, SamplesDesc};
-use crate::material::{BlinnPhongLobe, PhongLobe};
-use crate::math::{Arc, DirectionCone};
+use crate::material::{BlinnPhongLobe, Bsdf, Lobe, PhongLobe};
+use crate::math::{Arc, DirectionCone, ErrorBound};
 
 fn direction(random: &mut Random) -> Vec3 {
     DVec3::from(random.direction()).as_vec3()
@@ -123,6 +123,7 @@ fn no_bound_is_broken() {
             mirrors: cone(mirror, 3.0 * turn),
             wo: cone(wo, turn),
             lobe,
+            is_bumpy: false,
         };
         for _ in 0..4 {
             let p = center + direction(random) * (reach * random.unit() as f32);
@@ -131,6 +132,8 @@ fn no_bound_is_broken() {
             if ns.dot(wo) <= 0.0 {
                 continue;
             }
+            let bsdf = Bsdf { colors: Colors::BLACK, ambient: Rgb::BLACK, lobe };
+            let point = ShadingPoint::new(p, ErrorBound(Vec3::ZERO), ns, wo, &bsdf);
             for node in &tree.nodes {
                 let bounds = node.bounds.contribution(&receivers);
                 let mut held = Vec::new();
@@ -157,7 +160,7 @@ fn no_bound_is_broken() {
                     continue;
                 }
                 smooth += 1;
-                let (sent, error) = (flat(node.estimate(p, ns, wo, &lobe)), flat(node.error(&bounds)));
+                let (sent, error) = (flat(node.estimate(&point)), flat(node.error(&bounds)));
                 let power = f64::from(node.power.r + node.power.g + node.power.b);
                 for ((sum, sent), (error, most)) in sum
                     .iter()

@@ -3,6 +3,8 @@
 
 use std::iter;
 
+use arrayvec::ArrayVec;
+
 use super::{CellRenderer, Pixel, PixelState};
 use crate::film::hits::camera_ray;
 use crate::film::resolve::PixelTerms;
@@ -138,8 +140,8 @@ impl CellRenderer<'_> {
                 for Layer { surface, weight, .. } in &stack.layers {
                     pixel.terms.emission.add(scene.emission(surface), f64::from(*weight));
                     let point = ShadingPoint::of(surface, &scene.bsdf(surface).weighted(*weight), &scene.ambient);
-                    let both = iter::once(point).chain(scene.coat_point(surface, *weight));
-                    points.extend(both.map(|point| RayPoint { shape: None, point, at, is_layered: true }));
+                    let all = iter::once(point).chain(scene.further_points(surface, *weight));
+                    points.extend(all.map(|point| RayPoint { shape: None, point, at, is_layered: true }));
                 }
                 if left == 0.0 {
                     continue;
@@ -153,7 +155,7 @@ impl CellRenderer<'_> {
                 pixel.terms.emission.add(scene.lights[light].radiance, left.into());
                 continue;
             }
-            let mut coat = None;
+            let mut further = ArrayVec::new();
             // A shape has one normal at each point, without maps
             let shape = shape.filter(|_| !scene.geometry.is_mapped(&hit));
             let point = match shape {
@@ -161,7 +163,7 @@ impl CellRenderer<'_> {
                     let bsdf = self.fragments.plain_bsdf(scene, shape).unwrap_or_else(|| {
                         let si = shape.interaction(scene, ray, hit.t, &differential());
                         pixel.terms.emission.add(scene.emission(&si), left.into());
-                        coat = scene.coat_point(&si, left);
+                        further = scene.further_points(&si, left);
                         scene.bsdf(&si)
                     });
                     let bsdf = bsdf.weighted(left);
@@ -170,13 +172,13 @@ impl CellRenderer<'_> {
                 None => {
                     let si = scene.local_surface(ray, &hit, &differential());
                     pixel.terms.emission.add(scene.emission(&si), left.into());
-                    coat = scene.coat_point(&si, left);
+                    further = scene.further_points(&si, left);
                     ShadingPoint::of(&si, &scene.bsdf(&si).weighted(left), &scene.ambient)
                 }
             };
-            let is_layered = left != 1.0 || coat.is_some();
+            let is_layered = left != 1.0 || !further.is_empty();
             points.push(RayPoint { shape, point, at, is_layered });
-            points.extend(coat.map(|point| RayPoint { shape, point, at, is_layered }));
+            points.extend(further.into_iter().map(|point| RayPoint { shape, point, at, is_layered }));
         }
         let number = self.pixels.len() as u32;
         self.pixels.push(pixel);

@@ -222,7 +222,7 @@ pub(super) fn entry(node: u32, estimator: NodeEstimator) -> u32 {
 pub(super) fn sent(scene: &Scene, tree: &LightTree, entry: u32, point: &ShadingPoint) -> Colors {
     let node = &tree.nodes[(entry & !BY_REPRESENTATIVE) as usize];
     if entry & BY_REPRESENTATIVE == 0 {
-        return node.estimate(point.p, point.ns, point.wo, &point.bsdf.lobe);
+        return node.estimate(point);
     }
     sent_by_one(scene, &tree.nodes[node.representative as usize], point).map(|sent| node.power * sent)
 }
@@ -233,14 +233,12 @@ pub(super) fn sent_by_one(scene: &Scene, one: &LightNode, point: &ShadingPoint) 
     let light = &scene.lights[light as usize];
     let k = light.samples() / 2;
     let l = light.towards(k, point.p).l;
-    let height = point.ns.dot(l);
-    if !(point.horizon.dot(l) > 0.0 && height > 0.0) {
+    if !(point.horizon.dot(l) > 0.0 && point.ns.dot(l) > 0.0) {
         return Moments::ZERO;
     }
     if light.area().is_some() && one.has_estimate() {
-        return one.unit_estimate(point.p, point.ns, point.wo, &point.bsdf.lobe);
+        return one.unit_estimate(point);
     }
     let Some(sample) = light.sample(k, l) else { return Moments::ZERO };
-    let (cos_i, cos_io) = (height * sample.inverse_distance, point.wo.dot(l) * sample.inverse_distance);
-    point.bsdf.lobe.moments(cos_i, point.ns.dot(point.wo), cos_io, sample.weight)
+    point.moments(l, sample.inverse_distance, sample.weight)
 }

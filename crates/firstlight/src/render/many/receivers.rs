@@ -7,6 +7,7 @@ use crate::material::{Bsdf, Lobe, ShadingPoint};
 use crate::math::{Arc, DirectionCone, Vec3};
 use crate::render::cut::ReceiverColors;
 use crate::scene::Scene;
+use crate::shape::BumpShadowing;
 use crate::visibility::Viewpoint;
 
 /// Whether two patches can have one cut.
@@ -27,11 +28,12 @@ pub(super) fn mirror(point: &ShadingPoint) -> Vec3 {
 pub(super) fn receiver_bounds<'p>(patches: impl Iterator<Item = &'p Patch> + Clone, eye: Vec3) -> ReceiverBounds {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let (mut n, mut m, mut w) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
-    let mut lobe = Lobe::None;
+    let (mut lobe, mut is_bumpy) = (Lobe::None, false);
     for Patch { point, .. } in patches.clone() {
         (low, high) = (low.min(point.p), high.max(point.p));
         (n, m, w) = (n + point.ns, m + mirror(point), w + point.wo);
         lobe = point.bsdf.lobe;
+        is_bumpy |= point.bump_shadowing != BumpShadowing::default();
     }
     let center = low + (high - low) * 0.5;
     let (n, m, w) = (n.normalize_or(Vec3::Y), m.normalize_or(Vec3::Y), w.normalize_or(Vec3::Y));
@@ -45,7 +47,15 @@ pub(super) fn receiver_bounds<'p>(patches: impl Iterator<Item = &'p Patch> + Clo
         wo_turn = wo_turn.max((point.wo - w).length() + swing);
     }
     let cone = |axis: Vec3, chord: f32| DirectionCone { axis, angle: Arc::of_chord(chord) };
-    ReceiverBounds { center, radius, normals: cone(n, turn), mirrors: cone(m, blur), wo: cone(w, wo_turn), lobe }
+    ReceiverBounds {
+        center,
+        radius,
+        normals: cone(n, turn),
+        mirrors: cone(m, blur),
+        wo: cone(w, wo_turn),
+        lobe,
+        is_bumpy,
+    }
 }
 
 pub(super) fn receiver_colors(scene: &Scene, bsdf: &Bsdf) -> ReceiverColors {

@@ -24,6 +24,7 @@ use crate::math::{DVec3, LANES, LightEnd, ShadowRay, Vec3, Vec3x16};
 use crate::render::Counts;
 use crate::render::lanes::PointObstacles;
 use crate::scene::{Scene, ShadowRays};
+use crate::shape::BumpShadowing;
 use crate::visibility::{ShadowView, Target, Viewpoint};
 
 /// Points of the smallest set, and of the largest that is kept.
@@ -274,6 +275,7 @@ impl<'a> LightSampler<'a> {
 /// A receiver in all lanes, and the light that it samples.
 pub(super) struct ReceiverLanes<'a, S: Simd> {
     area: &'a Area,
+    bump_shadowing: BumpShadowing,
     lobe: LobeLanes,
     occluders: PointObstacles<'a>,
     p: Vec3x16<S>,
@@ -290,6 +292,7 @@ impl<'a, S: Simd> ReceiverLanes<'a, S> {
         let point = &receiver.point;
         ReceiverLanes {
             area: sampler.area,
+            bump_shadowing: point.bump_shadowing,
             lobe: LobeLanes::of(&point.bsdf.lobe),
             occluders: PointObstacles::of(&receiver.view),
             p: Vec3x16::splat(simd, point.p),
@@ -370,6 +373,7 @@ impl<'a, S: Simd> ReceiverLanes<'a, S> {
         let inverse_distance = simd.splat_f32x16(1.0) / distance2.sqrt();
         let weight = is_above.select(self.area.weight_lanes(points, block, l, inverse_distance), zero);
         samples.sends = weight.simd_gt(zero).to_bitmask() as u16;
+        let weight = self.bump_shadowing.shadowed(weight, self.horizon.dot(l) * inverse_distance);
         let (cos_i, cos_io) = (height * inverse_distance, self.wo.dot(l) * inverse_distance);
         self.lobe.for_each_moment(
             [cos_i],
