@@ -46,7 +46,7 @@ fn slopes(u: f64, v: f64) -> [f64; 2] {
     [du * HEIGHT, dv * HEIGHT]
 }
 
-fn files() -> MemoryAssets {
+pub fn files() -> MemoryAssets {
     let mirrored = |u: f64, v: f64| {
         let [du, dv] = slopes(1.0 - u, v);
         [-du, dv]
