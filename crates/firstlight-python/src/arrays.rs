@@ -124,9 +124,7 @@ pub fn mesh(
         })?;
     }
     if let Some(uv) = uv {
-        mesh.uvs = vec![with_floats(uv, "uv", &[2], |[rows, _], at| {
-            (0..rows).map(|i| [at(i, 0) as f32, at(i, 1) as f32]).collect()
-        })?];
+        mesh.uvs = uv_sets(uv)?;
     }
     if let Some(colors) = colors {
         let colors = &as_array(colors)?;
@@ -144,6 +142,18 @@ pub fn mesh(
         })?;
     }
     Ok(mesh)
+}
+
+/// Sets of texture coordinates: an array of shape (n, 2), or of shape (sets, n, 2).
+fn uv_sets(uv: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<[f32; 2]>>> {
+    let set = |uv: &Bound<'_, PyAny>, name: &str| {
+        with_floats(uv, name, &[2], |[rows, _], at| (0..rows).map(|i| [at(i, 0) as f32, at(i, 1) as f32]).collect())
+    };
+    let uv = &as_array(uv)?;
+    if uv.getattr("ndim")?.extract::<usize>()? != 3 {
+        return Ok(vec![set(uv, "uv")?]);
+    }
+    uv.try_iter()?.enumerate().map(|(i, one)| set(&one?, &format!("uv[{i}]"))).collect()
 }
 
 /// The lists of a mesh as a dict of bytes, for pickling.
@@ -170,13 +180,15 @@ pub fn restored(dict: &Bound<'_, PyDict>) -> PyResult<MeshData> {
     let floats = |key: &str| -> PyResult<Vec<f32>> {
         Ok(bytes(key)?.as_chunks::<4>().0.iter().map(|number| f32::from_le_bytes(*number)).collect())
     };
+    let positions: Vec<[f32; 3]> = floats("positions")?.as_chunks::<3>().0.to_vec();
+    // One set after the other
     let uvs: Vec<[f32; 2]> = floats("uvs")?.as_chunks::<2>().0.to_vec();
     let whole: Vec<u32> = bytes("triangles")?.as_chunks::<4>().0.iter().map(|n| u32::from_le_bytes(*n)).collect();
     let origin: Vec<f64> = bytes("origin")?.as_chunks::<8>().0.iter().map(|n| f64::from_le_bytes(*n)).collect();
     Ok(MeshData {
-        positions: floats("positions")?.as_chunks::<3>().0.to_vec(),
+        positions,
         normals: floats("normals")?.as_chunks::<3>().0.to_vec(),
-        uvs: if uvs.is_empty() { Vec::new() } else { vec![uvs] },
+        uvs: uvs.chunks(positions.len().max(1)).map(<[_]>::to_vec).collect(),
         colors: floats("colors")?.as_chunks::<4>().0.to_vec(),
         triangles: whole.as_chunks::<3>().0.to_vec(),
         origin: origin.try_into().map_err(|_| PyValueError::new_err("a stored mesh has no origin"))?,

@@ -54,6 +54,44 @@ def test_faults_of_meshes_name_the_row():
         scene.add_sphere(center=[0, 0, 0], raduis=1)
 
 
+def test_textures_choose_among_several_sets_of_uv():
+    one, other = FLOOR[:, [0, 2]] / 8, FLOOR[:, [2, 0]] / 3
+
+    def planes(uv, first, second, **mesh):
+        scene = fl.Scene.from_text("[camera]\nposition = [0, 5, 5]\n")
+        scene.add_checkerboard_texture("color", counts=[5, 3], **first)
+        scene.add_checkerboard_texture("glow", counts=[2, 7], **second)
+        scene.add_metallic_roughness_material(
+            "both", base_color={"texture": "color"}, occlusion={"texture": "glow"}, emissive={"texture": "glow"}
+        )
+        scene.add_mesh(FLOOR, FACES, uv=uv, material="both", **mesh)
+        found = pickle.loads(pickle.dumps(scene)).render(buffers=["albedo", "emission"], **SMALL)
+        return found["albedo"], found["emission"]
+
+    color, _ = planes(one, {}, {})
+    _, glow = planes(other, {}, {})
+    assert color.std() > 0.1 and glow.std() > 0.1
+    for static in (False, True):
+        for both in ([one, other], np.array([one, other], "f4")):
+            found = planes(both, {}, {"uv_set": 1}, static=static)
+            assert (found[0] == color).all() and (found[1] == glow).all()
+        found = planes([other, one], {"uv_set": 1}, {"uv_set": 0}, uv_set=1, static=static)
+        assert (found[0] == color).all() and (found[1] == glow).all()
+    with pytest.raises(fl.SceneError, match='the texture "glow" of the material "both" has uv_set 2: .* has 2 sets'):
+        planes([one, other], {}, {"uv_set": 2})
+    with pytest.raises(fl.SceneError, match=r"uv_set: 4 is outside 0 to 3"):
+        planes([one, other], {}, {"uv_set": 4})
+    for wrong, words in (([one, other[:3]], ""), (np.zeros((2, 4, 3)), r"uv\[0\].*\(n, 2\)"), (np.zeros((1, 2, 4, 2)), "uv:")):
+        with pytest.raises(ValueError, match=words):
+            fl.Scene().add_mesh(FLOOR, FACES, uv=wrong)
+    bad = np.array([one, other])
+    bad[1, 2] = np.nan
+    with pytest.raises(fl.SceneError, match=r"uv\[1\]\[2\]: .*NaN"):
+        fl.Scene().add_mesh(FLOOR, FACES, uv=bad)
+    with pytest.raises(fl.SceneError, match=r"uv\[1\]: 5 of them for 4 positions|uv\[0\]: 5 of them"):
+        fl.Scene().add_mesh(FLOOR, FACES, uv=np.zeros((2, 5, 2)))
+
+
 def test_things_move_by_their_handles():
     scene = room()
     before = scene.render(**SMALL)["color"]

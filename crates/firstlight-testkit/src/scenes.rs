@@ -139,7 +139,7 @@ pub fn blinn_phong(diffuse: ColorParam, specular: ColorParam, shininess: f64) ->
 
 pub fn checkerboard(counts: [u32; 2], colors: [V; 2]) -> TextureDesc {
     let colors = colors.map(|[r, g, b]| ColorDesc::linear(r, g, b));
-    TextureDesc::Checkerboard(CheckerboardDesc { counts, colors })
+    TextureDesc::Checkerboard(CheckerboardDesc { counts, colors, uv_set: None })
 }
 
 /// The built-in config 11, a room with four spheres under a square light, at another size.

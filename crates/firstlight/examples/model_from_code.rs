@@ -48,7 +48,8 @@ fn scene(width: u32, height: u32) -> SceneDesc {
     let lamp = RectangleDesc::with_edges([-2.0, 5.0, 2.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0]);
     desc.lights.push(LightDesc::Rectangle(RectangleDesc { strength: 28.0, ..lamp }));
     // Textures and materials have names, and others refer to them
-    let tiles = CheckerboardDesc { counts: [2, 2], colors: [ColorDesc::gray(0.75), ColorDesc::linear(0.2, 0.3, 0.4)] };
+    let colors = [ColorDesc::gray(0.75), ColorDesc::linear(0.2, 0.3, 0.4)];
+    let tiles = CheckerboardDesc { counts: [2, 2], colors, ..CheckerboardDesc::default() };
     desc.textures.push(("tiles".into(), TextureDesc::Checkerboard(tiles)));
     let floor = PhongDesc { diffuse: ColorParam::texture("tiles"), ..PhongDesc::default() };
     desc.materials.push(("floor".into(), MaterialDesc::Phong(floor)));

@@ -53,6 +53,7 @@ class _ShapeFields(TypedDict, total=False):
 
 class _MeshFields(_ShapeFields, total=False):
     smooth_deg: float | None
+    uv_set: int
 
 class _MaterialFields(TypedDict, total=False):
     emissive: ColorParam

@@ -13,7 +13,7 @@ from . import _fields, _models
 from ._firstlight import LIGHTS, MATERIALS, SHAPES, TEXTURES, SceneBase
 
 # Fields of a mesh that belong to its triangles; all others belong to the thing that is placed
-_OF_TRIANGLES = ("smooth_deg",)
+_OF_TRIANGLES = ("smooth_deg", "uv_set")
 
 
 @dataclass(frozen=True)
@@ -151,8 +151,9 @@ class Scene(SceneBase):
             The three vertices of each triangle, counted from 0, of any integer type.
         normals : array of shape (n, 3), optional
             A normal for each vertex.
-        uv : array of shape (n, 2), optional
-            A texture coordinate for each vertex.
+        uv : array of shape (n, 2) or (sets, n, 2), optional
+            A texture coordinate for each vertex, in one set or in several: `uv=[uv0, uv1]`. Textures with `uv_set` are
+            laid by the set of that number, all others by the `uv_set` of the mesh, which is 0 unless said.
         colors : array of shape (n, 3) or (n, 4), optional
             A colour for each vertex: linear floats, or uint8, 0 to 255 in sRGB. Alpha is not looked at.
         static : bool

@@ -173,12 +173,19 @@ fn several(strategy: impl Strategy<Value = [f64; 3]>) -> impl Strategy<Value = V
 }
 
 fn mesh() -> impl Strategy<Value = MeshDesc> {
-    let lists = (several(vector()), vec(any::<[u32; 3]>(), 0..3), several(vector()), vec([number(), number()], 0..3));
+    let uvs = || vec([number(), number()], 0..3);
+    let lists = (several(vector()), vec(any::<[u32; 3]>(), 0..3), several(vector()), (uvs(), vec(uvs(), 0..3)));
     let faces = (several(vector()), vec(text(), 0..3), vec(any::<u32>(), 0..3));
     (maybe(text()), lists, any::<u32>(), faces, maybe(number())).prop_map(
-        |(file, (positions, triangles, normals, uvs), uv_set, (colors, materials, face_materials), smooth_deg)| {
+        |(
+            file,
+            (positions, triangles, normals, (uvs, more_uvs)),
+            uv_set,
+            (colors, materials, face_materials),
+            smooth_deg,
+        )| {
             let file = file.map(FilePath::from);
-            let lists = MeshDesc { positions, triangles, normals, uvs, ..MeshDesc::default() };
+            let lists = MeshDesc { positions, triangles, normals, uvs, more_uvs, ..MeshDesc::default() };
             MeshDesc { file, uv_set, colors, materials, face_materials, smooth_deg, ..lists }
         },
     )
@@ -366,21 +373,22 @@ fn material() -> impl Strategy<Value = MaterialDesc> {
 }
 
 fn texture() -> impl Strategy<Value = TextureDesc> {
-    let checkerboard = (any::<[u32; 2]>(), [color(), color()])
-        .prop_map(|(counts, colors)| TextureDesc::Checkerboard(CheckerboardDesc { counts, colors }));
+    let checkerboard = (any::<[u32; 2]>(), [color(), color()], maybe(any::<u32>()))
+        .prop_map(|(counts, colors, uv_set)| TextureDesc::Checkerboard(CheckerboardDesc { counts, colors, uv_set }));
     let image = (
         text(),
         [select(Wrap::ALL), select(Wrap::ALL)],
         select(Filter::ALL),
         maybe(select(TextureSpace::ALL)),
         color(),
-        [[number(), number()], [number(), number()]],
+        ([[number(), number()], [number(), number()]], maybe(any::<u32>())),
     )
-        .prop_map(|(file, wrap, filter, color_space, border, [scale, offset])| {
-            let new = ImageTextureDesc { rotate_deg: scale[1], ..ImageTextureDesc::new(file.into()) };
+        .prop_map(|(file, wrap, filter, color_space, border, ([scale, offset], uv_set))| {
+            let new = ImageTextureDesc { rotate_deg: scale[1], uv_set, ..ImageTextureDesc::new(file.into()) };
             TextureDesc::Image(ImageTextureDesc { wrap, filter, color_space, border, scale, offset, ..new })
         });
-    let grid = any::<[u32; 2]>().prop_map(|counts| TextureDesc::UvGrid(UvGridDesc { counts }));
+    let grid = (any::<[u32; 2]>(), maybe(any::<u32>()))
+        .prop_map(|(counts, uv_set)| TextureDesc::UvGrid(UvGridDesc { counts, uv_set }));
     prop_oneof![checkerboard, image, grid]
 }
 

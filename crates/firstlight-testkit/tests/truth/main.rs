@@ -30,5 +30,6 @@ mod relight;
 mod robust;
 mod terminator;
 mod terms;
+mod uv_sets;
 
 use firstlight_testkit::{converged, exact_scenes, kept, random, scenes};

@@ -49,7 +49,7 @@ fn slopes(u: f64, v: f64) -> [f64; 2] {
 /// The slope of a map that bends all normals by as much, towards -u.
 const TILT: f64 = 0.75;
 
-fn files() -> MemoryAssets {
+pub fn files() -> MemoryAssets {
     let mirrored = |u: f64, v: f64| {
         let [du, dv] = slopes(1.0 - u, v);
         [-du, dv]

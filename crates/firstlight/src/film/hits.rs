@@ -277,6 +277,9 @@ mod tests {
         let tilted =
             "[[instance]]\nof = \"star\"\ntransform = { rotate_deg = [20, 30, 5], scale = [0.7, -1.1, 0.8] }\n";
         let own = "[[mesh]]\npositions = [[-3, -1, -1], [3, -1, -1], [0, 2, 0.4]]\ntriangles = [[0, 1, 2]]\n";
+        let mixed = "[material.phong.solid]\n[material.phong.veil]\nalpha_mode = \"blend\"\n[[group.star.mesh]]\n\
+                     positions = [[1, 0, 1], [2, 0, 1], [1, 1, 0], [0, 1, 1]]\ntriangles = [[0, 1, 2], [0, 2, 3]]\n\
+                     materials = [\"solid\", \"veil\"]\nface_materials = [0, 1]\n";
         let both = place(0.4, "") + &place(0.4, "") + tilted;
         for (number, (text, projection)) in [
             (both.clone(), ""),
@@ -284,6 +287,8 @@ mod tests {
             (both.clone() + own + ball, "projection = \"orthographic\"\nheight = 3"),
             (place(-1.0, "visible = false") + &both, ""),
             ((0..9).map(|k| place(f64::from(k) * 0.4 - 1.6, "")).collect::<String>() + ball, ""),
+            // An instance makes both meshes of its group opaque, which have one surface
+            (mixed.to_owned() + &place(0.4, "material = \"solid\""), ""),
         ]
         .into_iter()
         .enumerate()

@@ -49,11 +49,19 @@ impl MeshData {
                 tell(field.into(), "there are none".into(), "a mesh has positions and triangles");
             }
         }
-        let uvs = self.uvs.first().map_or(0, Vec::len);
-        let per_vertex = [("normals", self.normals.len()), ("uvs", uvs), ("colors", self.colors.len())];
-        for (field, length) in per_vertex.into_iter().filter(|(_, length)| *length != 0 && *length != vertices) {
-            let message = format!("{length} of them for {vertices} positions");
-            tell(field.into(), message, "give one for each vertex, or none");
+        let of_set = |set: usize| if self.uvs.len() == 1 { "uvs".to_owned() } else { format!("uvs[{set}]") };
+        let mut tell_length = |field: String, length: usize, hint: &str| {
+            if length != vertices {
+                tell(field, format!("{length} of them for {vertices} positions"), hint);
+            }
+        };
+        for (field, length) in [("normals", self.normals.len()), ("colors", self.colors.len())] {
+            if length != 0 {
+                tell_length(field.into(), length, "give one for each vertex, or none");
+            }
+        }
+        for (set, uvs) in self.uvs.iter().enumerate() {
+            tell_length(of_set(set), uvs.len(), "give one for each vertex");
         }
         let (origin, used) = (DVec3::from(self.origin), self.used_vertices());
         let is_used = |i: usize| used.get(i).is_none_or(|used| *used);
@@ -81,10 +89,11 @@ impl MeshData {
                 tell(format!("normals[{i}]"), format!("{normal:?} is outside [-1e30, 1e30]"), "");
             }
         }
-        let uvs = self.uvs.iter().flat_map(|set| set.iter().enumerate());
-        for (i, uv) in uvs.filter(|(i, _)| is_used(*i)) {
-            if !uv.iter().all(|c| c.abs() <= 1e30) {
-                tell(format!("uvs[{i}]"), format!("{uv:?} is outside [-1e30, 1e30]"), "");
+        for (set, uvs) in self.uvs.iter().enumerate() {
+            for (i, uv) in uvs.iter().enumerate().filter(|(i, _)| is_used(*i)) {
+                if !uv.iter().all(|c| c.abs() <= 1e30) {
+                    tell(format!("{}[{i}]", of_set(set)), format!("{uv:?} is outside [-1e30, 1e30]"), "");
+                }
             }
         }
         if let (true, Some(fault)) = (faults.is_empty(), self.fault()) {
@@ -161,6 +170,11 @@ mod tests {
         assert_eq!(paths[..6], expected);
         assert_eq!(paths[6..], ["uvs[0]", "uvs[1]", "uvs[2]"]);
         assert_eq!(MeshData::default().faults().len(), 2);
+        // Each of several sets has a place of its own
+        let mut sets = triangle();
+        sets.uvs = vec![vec![[0.0; 2]; 3], vec![[0.0; 2]; 2], vec![[0.0, f32::NAN]; 3]];
+        let paths: Vec<String> = sets.faults().into_iter().map(|fault| fault.path).collect();
+        assert_eq!(paths, ["uvs[1]", "uvs[2][0]", "uvs[2][1]", "uvs[2][2]"]);
         // What no triangle has may hold anything
         let mut unused = triangle();
         unused.positions.extend([[f32::NAN; 3], [1e30; 3]]);

@@ -98,7 +98,7 @@ impl MetallicRoughnessDesc {
         let f0 = f0 * f0;
         let reflection =
             MetallicRoughness { base_color, metallic, roughness, f0, specular, specular_color, occlusion, coat };
-        Material { reflection: Reflection::MetallicRoughness(reflection), common: self.common.compile(cx, params) }
+        Material::new(Reflection::MetallicRoughness(reflection), self.common.compile(cx, params))
     }
 }
 

@@ -16,6 +16,7 @@ mod normal_mapping;
 mod phong;
 mod shading_point;
 mod unlit;
+mod uv_sets;
 
 pub use alpha::{Alpha, AlphaMode};
 pub(crate) use ambient::ViewGeometry;
@@ -35,6 +36,7 @@ pub use normal_mapping::{NormalFix, NormalMapping};
 pub use phong::{PhongDesc, PhongLobe};
 pub(crate) use shading_point::ShadingPoint;
 pub use unlit::UnlitDesc;
+pub(crate) use uv_sets::UvSetUse;
 
 use arrayvec::ArrayVec;
 
@@ -77,6 +79,8 @@ pub struct Material {
     pub reflection: Reflection,
     /// What materials of all kinds have.
     pub common: MaterialCommon,
+    /// The sets of texture coordinates that its textures name.
+    pub(crate) uv_sets: UvSetUse,
 }
 
 /// How a material reflects light.
@@ -91,9 +95,14 @@ pub enum Reflection {
 }
 
 impl Material {
+    /// One whose textures name no set of texture coordinates.
+    pub(crate) fn new(reflection: Reflection, common: MaterialCommon) -> Material {
+        Material { reflection, common, uv_sets: UvSetUse::default() }
+    }
+
     /// That of shapes that name none.
     pub(crate) fn matte() -> Material {
-        Material { reflection: Reflection::Classic(Classic::matte()), common: MaterialCommon::none() }
+        Material::new(Reflection::Classic(Classic::matte()), MaterialCommon::none())
     }
 
     /// The material in numbers at one surface, under such ambient light.

@@ -74,7 +74,8 @@ impl NormalMapping {
     }
 
     /// The bent normal of the front at a surface, unit, and the variance of the slopes of the normals that it is the
-    /// mean of, over the pixel's footprint. `None` where the frame has no direction for u.
+    /// mean of, over the pixel's footprint. `frame` is what a map that is laid by a set of texture coordinates counts
+    /// from; `None` where that has no direction for u of any map.
     ///
     /// The variance is s^2 = (1 - |n|) / |n| of a mean normal of length |n|: Toksvig, "Mipmapping normal maps", Journal
     /// of Graphics Tools 10(3), 2005. Between the texels of a picture that is magnified a mean is shorter as well, but
@@ -85,12 +86,17 @@ impl NormalMapping {
     pub(crate) fn bent(
         &self,
         si: &SurfaceInteraction,
-        frame: &NormalFrame,
+        frame: impl Fn(Option<u8>) -> Option<NormalFrame>,
         textures: &[Texture],
     ) -> Option<(Vec3, f32)> {
-        let mut bent = frame.n;
+        let set_of = |texture: TextureId| textures[texture.index()].uv_set;
+        let [of_map, of_bump] = self.textures().map(|texture| texture.map(set_of));
+        let map_frame = of_map.and_then(&frame);
+        // Mostly one for both
+        let bump_frame = of_bump.and_then(|set| if of_map == Some(set) { map_frame } else { frame(set) });
+        let mut bent = map_frame.or(bump_frame)?.n;
         let mut variance = 0.0;
-        if let Some((texture, scale)) = self.map {
+        if let (Some((texture, scale)), Some(frame)) = (self.map, &map_frame) {
             let texture = &textures[texture.index()];
             let [x, y, z, _] = texture.value(si, si.footprints_per_pixel);
             let length = (x * x + y * y + z * z).sqrt();
@@ -101,7 +107,7 @@ impl NormalMapping {
                 bent = frame.t * x + frame.b * y + frame.n * z;
             }
         }
-        if let Some(height) = &self.bump {
+        if let (Some(height), Some(frame)) = (&self.bump, &bump_frame) {
             let [du, dv] = height.slopes(si, textures).map(f64::from);
             // The gradient of the height over the surface, across the normal
             let (n, [dpdu, dpdv]) = (frame.n.normalize_or_zero(), frame.dp);

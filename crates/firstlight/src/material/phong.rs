@@ -37,7 +37,7 @@ impl PhongDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext, params: &mut impl Params) -> Material {
         let colors = [&self.diffuse, &self.specular];
         let classic = Classic::new(cx, params, colors, &self.ambient, &self.shininess, LobeKind::Phong);
-        Material { reflection: Reflection::Classic(classic), common: self.common.compile(cx, params) }
+        Material::new(Reflection::Classic(classic), self.common.compile(cx, params))
     }
 }
 

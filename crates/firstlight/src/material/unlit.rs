@@ -31,7 +31,7 @@ impl UnlitDesc {
             let message = "a normal map or bump map changes nothing of what is unlit";
             cx.advise("", message, Some("take it out, or use a material that light falls on"));
         }
-        Material { reflection: Reflection::Unlit(color), common }
+        Material::new(Reflection::Unlit(color), common)
     }
 }
 

@@ -252,11 +252,10 @@ impl VisibleShape {
         let growth = self.growth(scene, &si, &ray, t, &differential);
         let material = &scene.materials[si.material.index()];
         let is_constant = growth.is_some_and(|growth| {
-            let Footprint { dx, dy, edges } = si.footprint;
             // Half a differential leads to the border, and half a pixel beyond are data of the pixels there
             let data = if material.has_data() { 0.5 * si.footprints_per_pixel } else { 0.0 };
             let part = (0.5 + 2.0 * growth).min(1.0) + data;
-            let grown = SurfaceInteraction { footprint: Footprint { dx: dx * part, dy: dy * part, edges }, ..si };
+            let grown = si.with_footprints(part);
             let grows = 1.0 + 2.0 * growth;
             material.ignores(si.slope_variance * (grows * grows))
                 && material.is_even(&grown, &scene.textures, &scene.ambient)

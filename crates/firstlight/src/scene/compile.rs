@@ -286,7 +286,8 @@ impl SceneDesc {
         let mut materials = Vec::with_capacity(self.materials.len() + 1);
         for (name, desc) in &self.materials {
             let path = format!("material.{}.{name}", desc.kind());
-            materials.push(cx.within(&path, |cx| desc.compile(cx, textures)));
+            let material = cx.within(&path, |cx| desc.compile(cx, textures));
+            materials.push(Material { uv_sets: textures.uv_sets(&material), ..material });
         }
         // The last one is for shapes that name none
         materials.push(Material::matte());

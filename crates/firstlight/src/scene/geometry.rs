@@ -17,7 +17,7 @@ use super::links::{LinkId, LinkSets};
 use super::occluders::Opacity;
 use crate::accel::{Aabb, Bvh};
 use crate::ids::{LightId, MaterialId, SurfaceId};
-use crate::material::Material;
+use crate::material::{Material, UvSetUse};
 use crate::math::{DAffine3, DVec3, Facet, Ray, Vec2};
 use crate::shape::{
     Mesh, Parallelogram, Placement, PointSet, ShadowTerminator, Solid, Sphere, TrianglePoint, UnboundedPlane,
@@ -116,6 +116,8 @@ pub(crate) struct MaterialRules {
     mapped: Vec<bool>,
     /// For each material whether its shading normals are bent, raised, or filtered; empty if those of none are.
     refined: Vec<bool>,
+    /// For each material the sets of texture coordinates that its textures name; empty if none of any does.
+    uv_sets: Vec<UvSetUse>,
 }
 
 impl MaterialRules {
@@ -129,7 +131,32 @@ impl MaterialRules {
             single_sided: each(|material| material.common.single_sided),
             mapped: each(Material::is_mapped),
             refined: each(Material::refines_normals),
+            uv_sets: match materials.iter().any(|material| material.uv_sets.all != 0) {
+                true => materials.iter().map(|material| material.uv_sets).collect(),
+                false => Vec::new(),
+            },
         }
+    }
+
+    /// The sets of texture coordinates that textures of a material name.
+    pub fn uv_sets(&self, material: MaterialId) -> UvSetUse {
+        self.uv_sets.get(material.index()).copied().unwrap_or_default()
+    }
+
+    /// The same, as bits.
+    #[inline(always)]
+    pub fn named_uv_sets(&self, material: MaterialId) -> u8 {
+        self.uv_sets.get(material.index()).map_or(0, |sets| sets.all)
+    }
+
+    /// Whether textures name any set of texture coordinates.
+    pub fn has_uv_sets(&self) -> bool {
+        !self.uv_sets.is_empty()
+    }
+
+    /// Whether a map of a material bends normals by the set of texture coordinates that the mesh chooses.
+    pub fn has_own_map(&self, material: MaterialId) -> bool {
+        self.is_mapped(material) && self.uv_sets.get(material.index()).is_none_or(|sets| sets.has_own_map)
     }
 
     /// Whether a material bends shading normals.

@@ -28,6 +28,7 @@ mod through;
 mod trace;
 mod transmittance;
 mod trees;
+mod uv_sets;
 mod world;
 
 pub use builtin::{Builtin, builtin_scenes};

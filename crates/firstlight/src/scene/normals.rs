@@ -42,8 +42,8 @@ impl Scene {
         // Turned together with the shading normal
         let is_back = si.ns.dot(front) < 0.0;
         let bent = |si: &SurfaceInteraction, maps: &NormalMapping| {
-            let frame = self.geometry.normal_frame(ray, hit, front)?;
-            let (bent, slope_variance) = maps.bent(si, &frame, &self.textures)?;
+            let frame = |set| self.geometry.normal_frame(ray, hit, front, set);
+            let (bent, slope_variance) = maps.bent(si, frame, &self.textures)?;
             let added = if filters { slope_variance } else { 0.0 };
             Some((if is_back { -bent } else { bent }, smooth.1 + added))
         };
@@ -124,15 +124,15 @@ fn mirroring(ng: Vec3, wo: Vec3, ns: Vec3) -> Vec3 {
 }
 
 impl Geometry {
-    /// What a normal map counts from at a hit of a shape whose front normal there is `n`. `None` where u has no
-    /// direction.
-    pub fn normal_frame(&self, ray: &Ray, hit: &Hit, n: Vec3) -> Option<NormalFrame> {
+    /// What a normal map that is laid by a set of texture coordinates counts from at a hit of a shape whose front normal
+    /// there is `n`. `None` where u has no direction.
+    pub fn normal_frame(&self, ray: &Ray, hit: &Hit, n: Vec3, set: Option<u8>) -> Option<NormalFrame> {
         match hit.at {
-            At::World(point) => self.world.as_ref()?.mesh.normal_frame(None, point),
+            At::World(point) => self.world.as_ref()?.mesh.normal_frame(None, point, set),
             At::Placed(index, PlacedSpot::Triangle(point)) => {
                 let Placed { placement, target, .. } = &self.placed[index as usize];
                 let PlacedTarget::Mesh(mesh) = *target else { unreachable!("only meshes have triangles") };
-                self.meshes[mesh as usize].normal_frame(Some(placement), point)
+                self.meshes[mesh as usize].normal_frame(Some(placement), point, set)
             }
             _ => NormalFrame::new(n.as_dvec3(), self.tangents(ray, hit)),
         }

@@ -4,6 +4,7 @@
 //! leaves in scene order, and one mesh joined from all its meshes. Then the scene is walked ([`SceneWalk`]), instances
 //! with it, and every leaf that is come across is given a surface and a place in the world.
 
+mod uv_sets;
 mod walk;
 
 use std::collections::HashMap;
@@ -18,7 +19,7 @@ use crate::context::{Assets, CompileContext};
 use crate::describe::Family;
 use crate::describe::node::quoted;
 use crate::ids::{MaterialId, SurfaceId};
-use crate::material::Material;
+use crate::material::{Material, UvSetUse};
 use crate::math::{DVec3, origin_for, origin_of_view};
 use crate::shape::{
     Common, CompileCache, Mesh, MeshBuilder, MeshFiles, MeshSource, Parallelogram, Placement, PointSet, ShapeDesc,
@@ -52,6 +53,11 @@ impl<'a> MaterialNames<'a> {
         MaterialId(self.names.len() as u32)
     }
 
+    /// What the scene calls one; the one of shapes that name none has no name.
+    fn name(&self, material: MaterialId) -> &'a str {
+        self.names.get(material.index()).copied().unwrap_or_default()
+    }
+
     /// The one of that name, if there is one.
     pub fn find(&self, name: &str) -> Option<MaterialId> {
         self.ids.get(name).copied().map(MaterialId)
@@ -82,6 +88,8 @@ struct PlacedShape {
     surface: Surface,
     /// Whether the material was named, and is not the default.
     has_material: bool,
+    /// How many sets of texture coordinates it has; of a mesh without any 0.
+    uv_sets: usize,
 }
 
 enum Form {
@@ -178,14 +186,16 @@ pub(super) fn compile_shapes(
     let group_ids = desc.groups.iter().enumerate().rev().map(|(id, (name, _))| (name.as_str(), id)).collect();
     let rules = MaterialRules::new(compiled);
     let shapes = desc.groups.iter().flat_map(|(_, group)| &group.shapes).chain(&desc.shapes);
-    let mut of_instances = shapes.filter(|shape| matches!(shape, ShapeDesc::Instance(_)));
-    let maps_groups = rules.has_maps()
-        && of_instances.any(|instance| {
-            let material = instance.common().material.and_then(|name| materials.find(name));
-            material.is_some_and(|material| rules.is_mapped(material))
-        });
+    let instances = shapes.filter(|shape| matches!(shape, ShapeDesc::Instance(_)));
+    let of_instances = instances.filter_map(|instance| materials.find(instance.common().material?));
+    let (mut maps_groups, mut uv_sets_of_instances) = (false, UvSetUse::default());
+    for material in of_instances.filter(|_| rules.has_maps() || rules.has_uv_sets()) {
+        maps_groups |= rules.has_own_map(material);
+        uv_sets_of_instances = uv_sets_of_instances.joined(&rules.uv_sets(material));
+    }
     let mut compiler = Compiler {
         maps_groups,
+        uv_sets_of_instances,
         desc,
         rules: &rules,
         materials,
@@ -202,7 +212,11 @@ pub(super) fn compile_shapes(
     for (name, group) in &desc.groups {
         groups.push(compiler.group(cx, &format!("group.{name}."), &group.shapes));
     }
+    let faults = cx.error_count();
     compiler.refuse_circles(cx, &groups);
+    if cx.error_count() == faults && rules.has_uv_sets() {
+        compiler.check_uv_sets_of_instances(cx, &root, &groups);
+    }
     let Compiler { solids, point_sets, links, .. } = compiler;
     if cx.error_count() > before {
         return None;
@@ -273,6 +287,8 @@ struct Compiler<'a, 'c> {
     point_sets: Vec<Arc<PointSet>>,
     /// Whether an instance may put a normal map on what is in a group.
     maps_groups: bool,
+    /// The sets of texture coordinates that materials of instances name.
+    uv_sets_of_instances: UvSetUse,
     /// Numbers for what surfaces say of rays.
     classes: HashMap<(RayRules, bool), u32>,
 }
@@ -289,7 +305,7 @@ impl Compiler<'_, '_> {
             for (i, shape) in of_kind.enumerate() {
                 let leaf = cx.within(&format!("{prefix}{word}[{i}]"), |cx| {
                     let number = leaves.len() as u32;
-                    self.leaf(cx, shape, number, &mut meshes)
+                    self.leaf(cx, shape, number, &mut meshes, !prefix.is_empty())
                 });
                 leaves.push(leaf);
             }
@@ -303,6 +319,7 @@ impl Compiler<'_, '_> {
         shape: &ShapeDesc,
         number: u32,
         meshes: &mut [MeshBuilder; 2],
+        is_in_group: bool,
     ) -> PlacedShape {
         let common = shape.common();
         let Common { name, material, transform, visible, casts_shadow, receives_shadow, single_sided, .. } = common;
@@ -324,6 +341,7 @@ impl Compiler<'_, '_> {
             solids.push(solid);
             Form::Solid(solids.len() as u32 - 1)
         };
+        let mut uv_sets = 1;
         let form = match shape {
             ShapeDesc::Sphere(desc) => Form::Sphere(desc.compile(cx)),
             ShapeDesc::Parallelogram(desc) => Form::Parallelogram(desc.compile(cx)),
@@ -342,8 +360,11 @@ impl Compiler<'_, '_> {
                 None => Form::Nothing,
             },
             ShapeDesc::Mesh(desc) => match desc.compile(cx, self.assets, self.files) {
-                Some(source) => {
+                Some(mut source) => {
                     let faces = self.face_materials(cx, &source, desc.file.is_some(), named);
+                    uv_sets = source.data.uvs.len();
+                    self.check_uv_sets_of_mesh(cx, desc, &source, &faces);
+                    source.named = self.named_uv_sets(&source, &faces, is_in_group);
                     surface.material = if let [one] = faces[..] { Some(one) } else { None };
                     let class = self.class(&surface);
                     self.add_mesh(cx, source, meshes, transform, [number, class], faces);
@@ -360,7 +381,10 @@ impl Compiler<'_, '_> {
                 }
             },
         };
-        PlacedShape { form, transform, surface, has_material: named.is_some() }
+        if let (Some(material), false) = (named, matches!(shape, ShapeDesc::Mesh(_) | ShapeDesc::Instance(_))) {
+            self.check_uv_sets_of_shape(cx, shape, material);
+        }
+        PlacedShape { form, transform, surface, has_material: named.is_some(), uv_sets }
     }
 
     /// A number for what a surface says of rays: of shapes at the same place, those of one number are the same to them.
@@ -386,6 +410,8 @@ impl Compiler<'_, '_> {
                 let message = "a normal map or bump map is on a mesh without texture coordinates";
                 cx.advise("material", message, Some("each triangle shows one corner of the picture"));
             }
+        }
+        if source.named.own_maps {
             meshes.iter_mut().for_each(|mesh| mesh.has_tangents = true);
         }
         let layered: Vec<bool> = faces.iter().map(|material| self.rules.is_layered(*material)).collect();

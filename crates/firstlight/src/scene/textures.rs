@@ -14,10 +14,11 @@ use crate::describe::{Channel, ColorDesc, ColorParam, FilePath, NumberParam};
 use crate::ids::TextureId;
 use crate::image::ImageError;
 use crate::image::read::{Limits, PictureHeader, decode, read_header};
-use crate::shape::{CompileCache, ShapeDesc, key_of};
+use crate::material::{Material, UvSetUse};
+use crate::shape::{CompileCache, ShapeDesc, UV_SETS, key_of};
 use crate::texture::{
-    CheckerboardDesc, ImageTextureDesc, MaskRule, Param, Params, Pyramid, Texture, TextureDesc, TextureSpace,
-    TextureUse,
+    CheckerboardDesc, ImageTextureDesc, MaskRule, Param, Params, Pyramid, Texture, TextureDesc, TexturePattern,
+    TextureSpace, TextureUse,
 };
 
 /// The largest picture file read as a texture, in bytes.
@@ -166,6 +167,15 @@ impl<'a> TextureRequests<'a> {
         Param { texture, ..Param::constant(factor) }
     }
 
+    /// Which sets of texture coordinates the textures of a material name.
+    pub(super) fn uv_sets(&self, material: &Material) -> UvSetUse {
+        let named = |id: TextureId| {
+            let index = self.wanted[id.index()].0;
+            named_set(&self.desc.textures[index].1).map(|set| (set, index as u32))
+        };
+        material.uv_set_use(named)
+    }
+
     /// Reads and decodes all pictures, on all threads, each once; those that no material uses as well, to find their
     /// faults.
     pub(super) fn finish(self, cx: &mut CompileContext) -> Textures<'a> {
@@ -251,11 +261,11 @@ impl<'a> TextureRequests<'a> {
         textures.sizes = self.sizes(&read, &file_of);
         // Put them together
         let silent = &mut CompileContext::default();
-        textures.compiled.extend(self.wanted.iter().map(|(index, of)| match &self.desc.textures[*index].1 {
-            TextureDesc::Checkerboard(board) => Texture::Checkerboard(for_mask(board, *of).compile(silent)),
+        let mut pattern = |desc: &TextureDesc, of: TextureUse| match desc {
+            TextureDesc::Checkerboard(board) => TexturePattern::Checkerboard(for_mask(board, of).compile(silent)),
             TextureDesc::UvGrid(grid) => {
                 let image = ImageTextureDesc::new(FilePath(String::new()));
-                Texture::Image(image.texture(Arc::new(Pyramid::new(&grid.picture(), *of))))
+                TexturePattern::Image(image.texture(Arc::new(Pyramid::new(&grid.picture(), of))))
             }
             TextureDesc::Image(image) => {
                 let picture = read[file_of[image.file.0.as_str()]].as_ref().ok().map(|file| picture_of[&file.hash]);
@@ -264,10 +274,14 @@ impl<'a> TextureRequests<'a> {
                     made[picture].as_ref().ok().map(|pyramids| pyramids[at].clone())
                 });
                 match pyramid {
-                    Some(pyramid) => Texture::Image(image.texture(pyramid)),
-                    None => Texture::Checkerboard(placeholder(*of).compile(silent)),
+                    Some(pyramid) => TexturePattern::Image(image.texture(pyramid)),
+                    None => TexturePattern::Checkerboard(placeholder(of).compile(silent)),
                 }
             }
+        };
+        textures.compiled.extend(self.wanted.iter().map(|(index, of)| {
+            let desc = &self.desc.textures[*index].1;
+            Texture { pattern: pattern(desc, *of), uv_set: named_set(desc) }
         }));
         textures
     }
@@ -346,6 +360,11 @@ impl SharedPicture<'_> {
         };
         Ok(self.uses.iter().zip(kept).map(of_use).collect())
     }
+}
+
+/// The set of texture coordinates that a texture names; one that is too large is a fault elsewhere.
+fn named_set(desc: &TextureDesc) -> Option<u8> {
+    desc.uv_set().map(|set| set.min(UV_SETS as u32 - 1) as u8)
 }
 
 const STANDS_IN: &str = "magenta and black stand in for it, unless compiled strictly";
@@ -466,7 +485,7 @@ fn placeholder(of: TextureUse) -> CheckerboardDesc {
         TextureUse::Normal => [ColorDesc::linear(0.0, 0.0, 1.0); 2],
         TextureUse::Mask(_) => [ColorDesc::WHITE; 2],
     };
-    CheckerboardDesc { counts: [8, 8], colors }
+    CheckerboardDesc { counts: [8, 8], colors, uv_set: None }
 }
 
 /// A board whose colours are numbers, as the mask that they make.

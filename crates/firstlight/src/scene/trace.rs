@@ -8,7 +8,9 @@ use super::occluders::{Listed, ListedOccluders};
 use crate::color::Rgb;
 use crate::ids::{LightId, SurfaceId};
 use crate::math::{LightEnd, Ray, ShadowRay};
-use crate::shape::{BumpShadowing, RayDifferential, ShadowTerminator, ShapePoint, Sphere, SurfaceInteraction};
+use crate::shape::{
+    BumpShadowing, RayDifferential, ShadowTerminator, ShapePoint, Sphere, SurfaceInteraction, TexturePoint, UV_SETS,
+};
 
 pub use super::geometry::Hit;
 
@@ -197,6 +199,7 @@ impl Scene {
             wo,
             uv,
             footprint,
+            uv_sets: [TexturePoint::default(); UV_SETS],
             footprints_per_pixel: differential.steps_per_pixel,
             slope_variance: 0.0,
             coat_ns: ns,
@@ -208,6 +211,10 @@ impl Scene {
             material,
             receives_shadow,
         };
+        let sets = self.geometry.rules.named_uv_sets(material);
+        if sets != 0 {
+            self.geometry.find_texture_points(&mut si, ray, hit, differential, sets);
+        }
         if self.geometry.rules.refines(material) {
             self.refine_normal(&mut si, ray, hit, shading, differential);
         }

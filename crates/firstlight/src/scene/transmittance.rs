@@ -86,19 +86,18 @@ impl Veils<'_> {
         let surface = &geometry.surfaces[hit.surface.index()];
         let material = surface.material.unwrap_or_else(|| geometry.face_material(&hit));
         let Some(alpha) = scene.alpha_of(material) else { return true };
-        let (uv, vertex) = match hit.at {
+        let alpha = match hit.at {
             At::Placed(index, PlacedSpot::Triangle(point)) => {
                 let PlacedTarget::Mesh(mesh) = geometry.placed[index as usize].target else { return false };
                 let mesh = &geometry.meshes[mesh as usize];
-                (mesh.uv(point), mesh.alpha(point))
+                alpha.at_point(|set| mesh.uv(point, set), mesh.alpha(point), &scene.textures)
             }
             _ => {
                 let line = Ray { o: ray.start, d: ray.l };
                 let point = geometry.point(&line, &hit, &RayDifferential::default(), ShadowTerminator::Hard);
-                (point.uv, point.alpha)
+                alpha.at_point(|_| point.uv, point.alpha, &scene.textures)
             }
         };
-        let alpha = alpha.at_point(uv, vertex, &scene.textures);
         if alpha > 0.0 && alpha < 1.0 {
             let primitive = geometry.primitive(&hit).unwrap_or(0);
             factors.push(LayerFactor { hit, primitive, left: 1.0 - alpha });

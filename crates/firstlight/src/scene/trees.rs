@@ -132,7 +132,8 @@ impl Geometry {
 
     /// Finds the meshes that are placed where camera rays inside of `planes` may meet them, if all that is placed there
     /// is a few meshes that let no ray pass: then each can be asked for many rays at once, see
-    /// [`meet_placed_tile`](Self::meet_placed_tile). What has no end is not among them.
+    /// [`meet_placed_tile`](Self::meet_placed_tile). What has no end is not among them. Hits with them are told apart by
+    /// their surfaces: two with the same are not a few.
     pub fn few_meshes(&self, level: Level, planes: &Planes, found: &mut Vec<u32>) -> bool {
         found.clear();
         if self.items.is_empty() {
@@ -147,7 +148,13 @@ impl Geometry {
             }
             (is_mesh && found.len() <= FEW_MESHES) || thing.camera == Opacity::Clear
         };
-        dispatch_eight!(level, simd => self.upper.gather(simd, |center, half| planes.within(center, half).test(), take))
+        let are_few = dispatch_eight!(level, simd => {
+            self.upper.gather(simd, |center, half| planes.within(center, half).test(), take)
+        });
+        // The opaque mesh of a group and the other one, if an instance makes that opaque
+        let surface = |index: u32| self.placed[index as usize].surface;
+        let is_copy = |i: usize| found[..i].iter().any(|other| surface(*other) == surface(found[i]));
+        are_few && !(1..found.len()).any(is_copy)
     }
 
     /// Finds the facets of meshes that camera rays inside of `planes` may meet, if they are few and flat, and all that
@@ -459,13 +466,13 @@ impl Geometry {
             At::Parallelogram(i) => self.parallelograms[i as usize].shape.tangents(),
             At::World(point) => {
                 let world = self.world.as_ref().expect("the hit is on it");
-                world.mesh.tangents(None, point.triangle)
+                world.mesh.tangents(None, point.triangle, None)
             }
             At::Placed(index, spot) => {
                 let Placed { placement, target, .. } = &self.placed[index as usize];
                 match (*target, spot) {
                     (PlacedTarget::Mesh(mesh), PlacedSpot::Triangle(point)) => {
-                        self.meshes[mesh as usize].tangents(Some(placement), point.triangle)
+                        self.meshes[mesh as usize].tangents(Some(placement), point.triangle, None)
                     }
                     (PlacedTarget::Points(points), PlacedSpot::Point(point)) => {
                         self.point_sets[points as usize].tangents(placement, point, ray, hit.t)

@@ -50,14 +50,14 @@ pub(crate) use cache::{MeshFiles, key_of};
 pub(crate) use common::Common;
 pub(crate) use cover::{Cover, LightSeen};
 pub(crate) use disk::{Disk, DiskShadow};
-pub(crate) use mesh::{JoinedPart, Mesh, MeshBuilder, MeshSource, TrianglePoint};
+pub(crate) use mesh::{JoinedPart, Mesh, MeshBuilder, MeshSource, NamedSets, TrianglePoint};
 pub(crate) use parallelogram::{ParallelogramShadow, PlaneSide};
 pub(crate) use placement::Placement;
 pub(crate) use plane::UnboundedPlane;
 pub(crate) use point_set::PointSet;
 pub(crate) use solid::{Canonical, LineLanes, Solid, SolidHit};
 pub(crate) use sphere::SphereShadow;
-pub(crate) use surface::ShapePoint;
+pub(crate) use surface::{ShapePoint, TexturePoint, UV_SETS};
 pub(crate) use triangles::{Eye, SeenParts, SeenTriangle, TOGETHER, TileHits, TriangleTree, bits, every};
 
 use crate::describe::family;

@@ -41,6 +41,19 @@ pub struct Footprint {
     pub edges: [UvEdge; 2],
 }
 
+/// How many sets of the texture coordinates of a mesh textures may name. glTF asks programs for two; each takes 24 bytes
+/// of every surface that is seen.
+pub(crate) const UV_SETS: usize = 4;
+
+/// A place on textures: the texture coordinate of one set, and its steps from one ray of the grid to the next, as in
+/// [`Footprint`].
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct TexturePoint {
+    pub uv: Vec2,
+    pub dx: Vec2,
+    pub dy: Vec2,
+}
+
 /// What a normal map counts from at a point of a shape, world space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NormalFrame {
@@ -119,6 +132,8 @@ pub struct SurfaceInteraction {
     pub uv: Vec2,
     /// The patch of texture that the camera ray stands for.
     pub footprint: Footprint,
+    /// The same of the sets that textures of the material name; those of others are 0.
+    pub(crate) uv_sets: [TexturePoint; UV_SETS],
     /// How many times as long and as wide the patch is that a pixel stands for.
     pub(crate) footprints_per_pixel: f32,
     /// How much larger the variance of the slopes of microfacets is than the material says: that of the normals within
@@ -141,6 +156,28 @@ pub struct SurfaceInteraction {
 }
 
 impl SurfaceInteraction {
+    /// The texture coordinate, and the patch of texture, of a set that a texture of the material names; without one,
+    /// those of the set that the mesh chooses.
+    #[inline(always)]
+    pub(crate) fn texture_point(&self, set: Option<u8>) -> (Vec2, Footprint) {
+        match set {
+            None => (self.uv, self.footprint),
+            Some(set) => {
+                let TexturePoint { uv, dx, dy } = self.uv_sets[usize::from(set) % UV_SETS];
+                // Beyond set 0 there are only meshes, which have no edges
+                (uv, Footprint { dx, dy, ..self.footprint })
+            }
+        }
+    }
+
+    /// The same surface with patches of texture that are `part` times as long and as wide.
+    pub(crate) fn with_footprints(self, part: f32) -> SurfaceInteraction {
+        let Footprint { dx, dy, edges } = self.footprint;
+        let scaled = |at: TexturePoint| TexturePoint { dx: at.dx * part, dy: at.dy * part, ..at };
+        let footprint = Footprint { dx: dx * part, dy: dy * part, edges };
+        SurfaceInteraction { footprint, uv_sets: self.uv_sets.map(scaled), ..self }
+    }
+
     /// Where rays to lights start.
     #[inline(always)]
     pub(crate) fn shadow_start(&self) -> Vec3 {

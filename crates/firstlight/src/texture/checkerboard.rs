@@ -3,6 +3,7 @@
 use arrayvec::ArrayVec;
 use glam::DVec2;
 
+use super::check_uv_set;
 use crate::color::Rgb;
 use crate::context::CompileContext;
 use crate::describe::{ColorDesc, table};
@@ -25,6 +26,9 @@ table! {
         pub counts: [u32; 2] = [8, 8],
         /// The first colour, that of the square at (0, 0), and the second.
         pub colors: [ColorDesc; 2] = [ColorDesc::WHITE, ColorDesc::BLACK],
+        /// Which set of a mesh's texture coordinates the texture is laid by, 0 to 3; without it the mesh's own `uv_set`.
+        /// Shapes of other kinds have set 0 alone.
+        pub uv_set: Option<u32> = None,
     }
 }
 
@@ -41,6 +45,7 @@ impl CheckerboardDesc {
             cx.count(&format!("counts[{i}]"), *count, 1, MAX_COUNT, Some("squares along that axis"));
         }
         let colors = [0, 1].map(|i| cx.color(&format!("colors[{i}]"), self.colors[i]));
+        check_uv_set(cx, self.uv_set);
         Checkerboard { counts: self.counts, colors }
     }
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::{DMat2, DVec2};
 
+use super::check_uv_set;
 use super::filter::{Beyond, TexturePlace};
 use super::pyramid::Pyramid;
 use crate::context::CompileContext;
@@ -77,6 +78,9 @@ table! {
         pub rotate_deg: f64 = 0.0,
         /// Added to the coordinate, after all else; each number from -1e6 to 1e6.
         pub offset: [f64; 2] = [0.0, 0.0],
+        /// Which set of a mesh's texture coordinates the texture is laid by, 0 to 3; without it the mesh's own `uv_set`.
+        /// Shapes of other kinds have set 0 alone.
+        pub uv_set: Option<u32> = None,
     }
 }
 
@@ -103,6 +107,7 @@ impl ImageTextureDesc {
         }
         cx.between("rotate_deg", self.rotate_deg, -MAX_TURN, MAX_TURN, Some("in degrees"));
         cx.color("border", self.border);
+        check_uv_set(cx, self.uv_set);
     }
 
     /// The texture, of texels that were made for one use.

@@ -20,7 +20,7 @@ use crate::context::CompileContext;
 use crate::describe::{Channel, ColorParam, NumberParam, family};
 use crate::ids::TextureId;
 use crate::math::Vec2;
-use crate::shape::{Footprint, SurfaceInteraction, UvEdge};
+use crate::shape::{Footprint, SurfaceInteraction, UV_SETS, UvEdge};
 
 family! {
     /// A texture as a scene may say it.
@@ -34,9 +34,37 @@ family! {
     }
 }
 
+impl TextureDesc {
+    /// Which set of a mesh's texture coordinates it is laid by; `None`: the one that the mesh chooses.
+    pub(crate) fn uv_set(&self) -> Option<u32> {
+        match self {
+            TextureDesc::Checkerboard(board) => board.uv_set,
+            TextureDesc::Image(image) => image.uv_set,
+            TextureDesc::UvGrid(grid) => grid.uv_set,
+        }
+    }
+}
+
+/// Finds the fault of a texture's set of texture coordinates.
+pub(crate) fn check_uv_set(cx: &mut CompileContext, uv_set: Option<u32>) {
+    if let Some(set) = uv_set {
+        let hint = "sets are counted from 0; without it the mesh chooses";
+        cx.count("uv_set", set, 0, UV_SETS as u32 - 1, Some(hint));
+    }
+}
+
 /// A texture, ready to be looked up.
 #[derive(Clone, Debug)]
-pub enum Texture {
+pub struct Texture {
+    /// What it shows.
+    pub pattern: TexturePattern,
+    /// The set of texture coordinates that it is laid by, 0 to 3; `None`: the one that the mesh chooses.
+    pub uv_set: Option<u8>,
+}
+
+/// What a texture shows.
+#[derive(Clone, Debug)]
+pub enum TexturePattern {
     /// `[texture.checkerboard.NAME]`
     Checkerboard(Checkerboard),
     /// `[texture.image.NAME]`, and the picture of a `[texture.uv-grid.NAME]`
@@ -51,47 +79,51 @@ impl Texture {
     /// that is solid, in all four.
     #[inline]
     pub fn value(&self, si: &SurfaceInteraction, scale: f32) -> [f32; 4] {
-        self.around(si.uv, &si.footprint, scale)
+        let (uv, footprint) = si.texture_point(self.uv_set);
+        self.around(uv, &footprint, scale)
     }
 
     /// The same at another texture coordinate.
     #[inline]
     fn around(&self, uv: Vec2, footprint: &Footprint, scale: f32) -> [f32; 4] {
-        match self {
-            Texture::Checkerboard(board) => {
+        match &self.pattern {
+            TexturePattern::Checkerboard(board) => {
                 let Footprint { dx, dy, edges } = *footprint;
                 let Rgb { r, g, b } = board.color(uv, &Footprint { dx: dx * scale, dy: dy * scale, edges });
                 [r, g, b, 1.0]
             }
-            Texture::Image(image) => image.value(uv, footprint, scale),
+            TexturePattern::Image(image) => image.value(uv, footprint, scale),
         }
     }
 
     /// How many texels the longer side of such a footprint is; 1 on what has none.
     pub(crate) fn texels_across(&self, si: &SurfaceInteraction, scale: f32) -> f32 {
-        match self {
-            Texture::Checkerboard(_) => 1.0,
-            Texture::Image(image) => image.texels_across(si.uv, &si.footprint, scale),
+        match &self.pattern {
+            TexturePattern::Checkerboard(_) => 1.0,
+            TexturePattern::Image(image) => {
+                let (uv, footprint) = si.texture_point(self.uv_set);
+                image.texels_across(uv, &footprint, scale)
+            }
         }
     }
 
     /// The sides of a texel in u and in v; 0 on what has none.
     fn texel(&self) -> Vec2 {
-        match self {
-            Texture::Checkerboard(_) => Vec2::ZERO,
-            Texture::Image(image) => image.texel(),
+        match &self.pattern {
+            TexturePattern::Checkerboard(_) => Vec2::ZERO,
+            TexturePattern::Image(image) => image.texel(),
         }
     }
 
     /// Whether a mask is solid at a point of a surface, on its finest level: what light meets.
     #[inline]
     pub(crate) fn is_solid(&self, uv: Vec2) -> bool {
-        match self {
-            Texture::Checkerboard(board) => {
+        match &self.pattern {
+            TexturePattern::Checkerboard(board) => {
                 let point = Footprint { dx: Vec2::ZERO, dy: Vec2::ZERO, edges: [UvEdge::Unbounded; 2] };
                 board.color(uv, &point).r >= 0.5
             }
-            Texture::Image(image) => image.is_solid(uv),
+            TexturePattern::Image(image) => image.is_solid(uv),
         }
     }
 
@@ -99,28 +131,31 @@ impl Texture {
     #[inline]
     pub(crate) fn at(&self, uv: Vec2) -> [f32; 4] {
         let point = Footprint { dx: Vec2::ZERO, dy: Vec2::ZERO, edges: [UvEdge::Unbounded; 2] };
-        match self {
-            Texture::Checkerboard(board) => {
+        match &self.pattern {
+            TexturePattern::Checkerboard(board) => {
                 let Rgb { r, g, b } = board.color(uv, &point);
                 [r, g, b, 1.0]
             }
-            Texture::Image(image) => image.value(uv, &point, 1.0),
+            TexturePattern::Image(image) => image.value(uv, &point, 1.0),
         }
     }
 
     /// How far its colours differ, if its value is the area mean over the footprint, whatever its size.
     pub(crate) fn contrast(&self) -> Option<Rgb> {
-        match self {
-            Texture::Checkerboard(board) => Some(board.contrast()),
-            Texture::Image(_) => None,
+        match &self.pattern {
+            TexturePattern::Checkerboard(board) => Some(board.contrast()),
+            TexturePattern::Image(_) => None,
         }
     }
 
     /// Whether it is proved to be the same all within a step of the footprint.
     pub(crate) fn is_even(&self, si: &SurfaceInteraction) -> bool {
-        match self {
-            Texture::Checkerboard(board) => board.is_even(si.uv, &si.footprint),
-            Texture::Image(_) => false,
+        match &self.pattern {
+            TexturePattern::Checkerboard(board) => {
+                let (uv, footprint) = si.texture_point(self.uv_set);
+                board.is_even(uv, &footprint)
+            }
+            TexturePattern::Image(_) => false,
         }
     }
 }
@@ -212,12 +247,13 @@ impl Param<f32> {
     /// each side, and no farther than the surface goes.
     pub(crate) fn slopes(&self, si: &SurfaceInteraction, textures: &[Texture]) -> [f32; 2] {
         let Some(texture) = self.texture.map(|id| &textures[id.index()]) else { return [0.0; 2] };
-        let Footprint { dx, dy, edges } = si.footprint;
+        let (uv, footprint) = si.texture_point(texture.uv_set);
+        let Footprint { dx, dy, edges } = footprint;
         let scale = si.footprints_per_pixel;
         let reach = ((dx.abs() + dy.abs()) * scale).max(texture.texel()).max(Vec2::splat(LEAST_REACH)) * 0.5;
-        let number = |uv: Vec2| self.of(texture.around(uv, &si.footprint, scale));
+        let number = |uv: Vec2| self.of(texture.around(uv, &footprint, scale));
         let slope = |axis: usize| {
-            let (mut low, mut high) = (si.uv, si.uv);
+            let (mut low, mut high) = (uv, uv);
             (low[axis], high[axis]) = (low[axis] - reach[axis], high[axis] + reach[axis]);
             if edges[axis] == UvEdge::Bounded {
                 (low[axis], high[axis]) = (low[axis].max(0.0), high[axis].min(1.0));

@@ -1,5 +1,6 @@
 //! A grid with numbers, to look at uv coordinates with.
 
+use super::check_uv_set;
 use crate::context::CompileContext;
 use crate::describe::table;
 use crate::image::read::{TexelSamples, Texels};
@@ -16,6 +17,9 @@ table! {
     pub struct UvGridDesc {
         /// Cells along u and along v, 1 to 32 each.
         pub counts: [u32; 2] = [8, 8],
+        /// Which set of a mesh's texture coordinates the texture is laid by, 0 to 3; without it the mesh's own `uv_set`.
+        /// Shapes of other kinds have set 0 alone.
+        pub uv_set: Option<u32> = None,
     }
 }
 
@@ -46,6 +50,7 @@ impl UvGridDesc {
         for (i, count) in self.counts.iter().enumerate() {
             cx.count(&format!("counts[{i}]"), *count, 1, MAX_COUNT, Some("cells along that axis"));
         }
+        check_uv_set(cx, self.uv_set);
     }
 
     /// The grid as a picture, sRGB.
@@ -92,7 +97,7 @@ mod tests {
 
     #[test]
     fn red_grows_with_u_and_green_with_v() {
-        let picture = UvGridDesc { counts: [4, 2] }.picture();
+        let picture = UvGridDesc { counts: [4, 2], ..UvGridDesc::default() }.picture();
         assert_eq!((picture.width, picture.height), (256, 128));
         let TexelSamples::U8(samples) = &picture.data else { panic!() };
         // Beside the lines at the lower left corner of each cell, u and v from 0
@@ -107,7 +112,7 @@ mod tests {
     #[test]
     fn every_size_has_its_texels() {
         for counts in [[1, 1], [32, 1], [1, 32], [7, 5]] {
-            let picture = UvGridDesc { counts }.picture();
+            let picture = UvGridDesc { counts, ..UvGridDesc::default() }.picture();
             let TexelSamples::U8(samples) = &picture.data else { panic!() };
             assert_eq!(samples.len() as u32, 3 * picture.width * picture.height);
         }

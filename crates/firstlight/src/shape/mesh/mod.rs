@@ -2,25 +2,21 @@
 //!
 //! What a ray finds on one is in [`surface`]; the tree of its triangles is in [`super::triangles`].
 
+mod join;
 mod surface;
 mod tangents;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use glam::DAffine3;
-
+pub(crate) use join::MeshBuilder;
 pub(crate) use surface::{JoinedPart, Mesh, TrianglePoint};
 
 use super::cache::{CompileCache, ContentKey, MeshFiles, key_of};
 use super::common::shape_table;
-use super::placement::Placement;
-use super::triangles::{TriangleTree, can_be_hit};
 use crate::context::{AssetError, Assets, CompileContext, CompileStage, show};
 use crate::describe::FilePath;
-use crate::ids::MaterialId;
 use crate::import::{MeshData, from_own_origin, read_mesh, used_vertices};
-use crate::math::{DVec3, Vec3};
 
 shape_table! {
     /// Triangles: from a PLY, STL or OBJ file, or written out.
@@ -47,7 +43,9 @@ shape_table! {
         pub normals: Vec<[f64; 3]> = Vec::new(),
         /// A texture coordinate for each vertex; without, (0, 0), (1, 0), (0, 1) at the corners of each triangle.
         pub uvs: Vec<[f64; 2]> = Vec::new(),
-        /// Which set of a file's texture coordinates is used, counted from 0.
+        /// Further sets of texture coordinates after `uvs`, which is set 0: of each a texture coordinate for each vertex.
+        pub more_uvs: Vec<Vec<[f64; 2]>> = Vec::new(),
+        /// Which set of texture coordinates is used, counted from 0, by all textures that name no set of their own.
         pub uv_set: u32 = 0,
         /// A colour for each vertex, linear Rec. 709.
         pub colors: Vec<[f64; 3]> = Vec::new(),
@@ -118,6 +116,19 @@ pub(crate) struct MeshSource {
     content: Option<ContentKey>,
     /// The numbers of its triangles in the mesh that it is a part of; empty if it is all of it.
     numbers: Vec<u32>,
+    /// What textures on it name.
+    pub named: NamedSets,
+}
+
+/// The sets of texture coordinates that textures on a mesh name and that it has, as bits.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct NamedSets {
+    /// All but the one that the mesh chooses.
+    pub all: u8,
+    /// Those of normal maps and bump maps.
+    pub maps: u8,
+    /// Whether a normal map or a bump map is laid by the one that the mesh chooses.
+    pub own_maps: bool,
 }
 
 impl MeshSource {
@@ -128,7 +139,7 @@ impl MeshSource {
         let numbers: Vec<u32> = (0..data.triangles.len() as u32).filter(|i| wanted(faces[*i as usize])).collect();
         data.triangles = numbers.iter().map(|i| self.data.triangles[*i as usize]).collect();
         data.face_materials = numbers.iter().map(|i| faces[*i as usize]).collect();
-        MeshSource { data: Arc::new(data), uv_set: self.uv_set, content: None, numbers }
+        MeshSource { data: Arc::new(data), content: None, numbers, ..*self }
     }
 }
 
@@ -170,7 +181,7 @@ impl MeshDesc {
             return None;
         }
         let (data, content) = self.smoothed(data, content, files.cache);
-        Some(MeshSource { data, uv_set, content, numbers: Vec::new() })
+        Some(MeshSource { data, uv_set, content, numbers: Vec::new(), named: NamedSets::default() })
     }
 
     /// The mesh as it is said, and its key where something is kept. `None` after an error.
@@ -244,12 +255,13 @@ impl MeshDesc {
         (0..said).map(of_vertex).collect()
     }
 
-    fn lists(&self) -> [(&'static str, bool); 8] {
+    fn lists(&self) -> [(&'static str, bool); 9] {
         [
             ("positions", !self.positions.is_empty()),
             ("triangles", !self.triangles.is_empty()),
             ("normals", !self.normals.is_empty()),
             ("uvs", !self.uvs.is_empty()),
+            ("more_uvs", !self.more_uvs.is_empty()),
             ("colors", !self.colors.is_empty()),
             ("alphas", !self.alphas.is_empty()),
             ("materials", !self.materials.is_empty()),
@@ -278,6 +290,13 @@ impl MeshDesc {
                 cx.error(field, message, Some("give one for each vertex, or none"));
             }
         }
+        if self.uvs.is_empty() && !self.more_uvs.is_empty() {
+            cx.error("more_uvs", "there are no `uvs`, which are set 0", Some("give the first set as `uvs`"));
+        }
+        for (set, uvs) in self.more_uvs.iter().enumerate().filter(|(_, uvs)| uvs.len() != vertices) {
+            let message = format!("{} of them for {vertices} positions", uvs.len());
+            cx.error(&format!("more_uvs[{set}]"), message, Some("give one for each vertex"));
+        }
         // What no triangle has may hold anything
         let used = used_vertices(vertices, &self.triangles);
         let is_used = |i: usize| used.get(i).is_none_or(|used| *used);
@@ -302,12 +321,16 @@ impl MeshDesc {
         for (i, alpha) in self.alphas.iter().enumerate().filter(|(i, _)| is_used(*i)) {
             cx.between(&format!("alphas[{i}]"), *alpha, 0.0, 1.0, Some("0 lets all light through, 1 none"));
         }
-        let normals = self.normals.iter().enumerate().map(|(i, normal)| ("normals", i, &normal[..]));
-        let uvs = self.uvs.iter().enumerate().map(|(i, uv)| ("uvs", i, &uv[..]));
-        for (field, i, numbers) in normals.chain(uvs).filter(|(_, i, _)| is_used(*i)) {
-            for number in numbers.iter().filter(|number| !(number.abs() <= 1e30)) {
+        let mut check_sizes = |field: &str, i: usize, numbers: &[f64]| {
+            for number in numbers.iter().filter(|number| is_used(i) && !(number.abs() <= 1e30)) {
                 cx.error(&format!("{field}[{i}]"), format!("{number} is outside [-1e30, 1e30]"), None);
             }
+        };
+        self.normals.iter().enumerate().for_each(|(i, normal)| check_sizes("normals", i, normal));
+        self.uvs.iter().enumerate().for_each(|(i, uv)| check_sizes("uvs", i, uv));
+        for (set, uvs) in self.more_uvs.iter().enumerate() {
+            let field = format!("more_uvs[{set}]");
+            uvs.iter().enumerate().for_each(|(i, uv)| check_sizes(&field, i, uv));
         }
         let faces = self.face_materials.len();
         if faces != 0 && faces != self.triangles.len() {
@@ -324,270 +347,18 @@ impl MeshDesc {
             return None;
         }
         let single3 = |v: &[f64; 3]| v.map(|c| c as f32);
+        let single2 = |uvs: &Vec<[f64; 2]>| uvs.iter().map(|uv| uv.map(|c| c as f32)).collect();
         let (positions, origin) = from_own_origin(vertices, is_used, |i| self.positions[i]);
         Some(MeshData {
             positions,
             origin,
             normals: self.normals.iter().map(single3).collect(),
-            uvs: if self.uvs.is_empty() {
-                Vec::new()
-            } else {
-                vec![self.uvs.iter().map(|uv| uv.map(|c| c as f32)).collect()]
-            },
+            uvs: [&self.uvs].into_iter().chain(&self.more_uvs).filter(|uvs| !uvs.is_empty()).map(single2).collect(),
             colors: self.vertex_colors(),
             triangles: self.triangles.clone(),
             face_materials: self.face_materials.clone(),
             materials: self.materials.clone(),
             ..MeshData::default()
         })
-    }
-}
-
-/// Joins the meshes of one space.
-#[derive(Default)]
-pub(crate) struct MeshBuilder {
-    /// As they came.
-    sources: Vec<JoinedSource>,
-    /// Vertices and triangles of all of them.
-    counts: [usize; 2],
-    bounds: Option<[DVec3; 2]>,
-    joined: Lists,
-    /// Whether a triangle that is there twice is met twice.
-    pub keeps_copies: bool,
-    /// Whether normal maps may be on it.
-    pub has_tangents: bool,
-}
-
-/// A mesh that is to be joined with others, and its part of them.
-struct JoinedSource {
-    data: Arc<MeshData>,
-    uv_set: usize,
-    content: Option<ContentKey>,
-    transform: Option<DAffine3>,
-    surface: u32,
-    class: u32,
-    materials: Vec<MaterialId>,
-    numbers: Vec<u32>,
-}
-
-/// What is joined of all meshes.
-#[derive(Default)]
-struct Lists {
-    positions: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
-    normals: Vec<[f32; 3]>,
-    uvs: Vec<[f32; 2]>,
-    colors: Vec<[f32; 4]>,
-    parts: Vec<JoinedPart>,
-    /// Of each part: rays treat parts of one class alike.
-    classes: Vec<u32>,
-}
-
-/// Makes `list` as long as `length` and adds `more`, if either has anything.
-fn join<T: Clone>(list: &mut Vec<T>, length: usize, more: Vec<T>, added: usize, filler: T) {
-    if list.is_empty() && more.is_empty() {
-        return;
-    }
-    list.resize(length, filler.clone());
-    if list.is_empty() {
-        *list = more;
-    } else {
-        list.extend(more);
-    }
-    list.resize(length + added, filler);
-}
-
-impl MeshBuilder {
-    /// Of a mesh in which a triangle that is there twice is met twice.
-    pub fn with_copies() -> MeshBuilder {
-        MeshBuilder { keeps_copies: true, ..MeshBuilder::default() }
-    }
-
-    /// Adds a mesh, moved by `transform`; `surface` is its number in the group, `materials` what its faces choose from.
-    /// Rays are let through, and light is stopped, by all meshes of a `class` alike.
-    pub fn add(
-        &mut self,
-        cx: &mut CompileContext,
-        source: MeshSource,
-        transform: Option<DAffine3>,
-        surface: u32,
-        class: u32,
-        materials: Vec<MaterialId>,
-    ) {
-        let MeshSource { data, uv_set, content, numbers } = source;
-        let counts = [self.counts[0] + data.positions.len(), self.counts[1] + data.triangles.len()];
-        if counts.iter().any(|count| *count > u32::MAX as usize) {
-            let message = "the meshes of one group have more than 4294967295 vertices or triangles together";
-            cx.error("file", message, Some("put some of them in a group of their own"));
-            return;
-        }
-        let bounds = bounds(&data, transform);
-        let largest = bounds.iter().flatten().fold(0.0f64, |most, corner| most.max(corner.abs().max_element()));
-        if largest > MAX_COORDINATE {
-            let message = format!("a vertex has the coordinate {}, outside [-2.5e8, 2.5e8]", largest as f32);
-            cx.error("file", message, Some("coordinates are in metres: scale the mesh"));
-            return;
-        }
-        if !data.triangles.iter().any(|triangle| can_be_hit(&data.positions, triangle)) {
-            advise_nothing(cx, &data);
-        }
-        cx.advise_vertex_colors(&data.colors);
-        self.counts = counts;
-        self.bounds = match (self.bounds, bounds) {
-            (Some([low, high]), Some([a, b])) => Some([low.min(a), high.max(b)]),
-            (all, own) => all.or(own),
-        };
-        self.sources.push(JoinedSource { data, uv_set, content, transform, surface, class, materials, numbers });
-    }
-
-    /// The box around all meshes so far, in the space that they are joined in.
-    pub fn bounds(&self) -> Option<[DVec3; 2]> {
-        self.bounds
-    }
-
-    /// What the joined mesh follows from; `None` where that is not known.
-    fn key(&self, origin: DVec3) -> Option<ContentKey> {
-        let mut parts =
-            vec![numbers(&origin.to_array()), vec![u8::from(self.keeps_copies), u8::from(self.has_tangents)]];
-        for source in &self.sources {
-            parts.push(source.content?.to_vec());
-            parts.push(source.transform.map_or(Vec::new(), |transform| numbers(&transform.to_cols_array())));
-            let whole = [source.uv_set as u32, source.surface, source.class].into_iter();
-            let whole = whole.chain(source.materials.iter().map(|material| material.0));
-            parts.push(whole.flat_map(u32::to_le_bytes).collect());
-        }
-        Some(key_of("joined mesh", parts.iter().map(Vec::as_slice)))
-    }
-
-    /// Joins all meshes, less `origin`, and builds the tree. `None` if there is nothing to be hit.
-    pub fn build(self, cx: &CompileContext, cache: Option<&CompileCache>, origin: DVec3) -> Option<Arc<Mesh>> {
-        let place = cache.zip(self.key(origin)).filter(|_| !self.sources.is_empty());
-        if let Some(mesh) = place.and_then(|(cache, key)| cache.find(&key)) {
-            return Some(mesh);
-        }
-        let mesh = Arc::new(self.build_anew(cx, origin)?);
-        if let Some((cache, key)) = place {
-            cache.keep(key, &mesh);
-        }
-        Some(mesh)
-    }
-
-    fn build_anew(mut self, cx: &CompileContext, origin: DVec3) -> Option<Mesh> {
-        for source in std::mem::take(&mut self.sources) {
-            self.joined.add(source, origin, self.has_tangents);
-        }
-        let Lists { positions, triangles, normals, uvs, colors, parts, classes } = self.joined;
-        if triangles.is_empty() {
-            return None;
-        }
-        cx.tell(CompileStage::Building { triangles: triangles.len() as u64 });
-        let tree = TriangleTree::build(&[], &[]);
-        let mut mesh = Mesh { positions, triangles, normals, uvs, colors, parts, tree };
-        // Copies of a triangle are one, but where rays may treat them differently: by their surface, or by the side
-        // that their normals say is the front
-        let own = |triangle| if self.keeps_copies { triangle } else { 0 };
-        let class = |triangle| (classes[mesh.part_index(triangle)], mesh.is_turned(triangle), own(triangle));
-        mesh.tree = TriangleTree::build_distinct(&mesh.positions, &mesh.triangles, class);
-        Some(mesh)
-    }
-}
-
-impl Lists {
-    fn add(&mut self, source: JoinedSource, origin: DVec3, has_tangents: bool) {
-        let JoinedSource { data, uv_set, transform, surface, class, materials, numbers, .. } = source;
-        let mut data = Arc::unwrap_or_clone(data);
-        move_mesh(&mut data, transform, origin);
-        let (vertices, first) = (self.positions.len(), self.triangles.len());
-        let MeshData { positions, mut triangles, normals, mut uvs, colors, face_materials, .. } = data;
-        let added = positions.len();
-        let own_uvs = if uv_set < uvs.len() { uvs.swap_remove(uv_set) } else { Vec::new() };
-        self.classes.push(class);
-        let tangents = match has_tangents && !own_uvs.is_empty() {
-            true => tangents::tangents(&positions, &triangles, &normals, &own_uvs),
-            false => Vec::new(),
-        };
-        self.parts.push(JoinedPart {
-            tangents,
-            first_triangle: first as u32,
-            surface,
-            face_materials,
-            materials,
-            numbers,
-            has_uvs: !own_uvs.is_empty(),
-        });
-        let colors = colors.into_iter().map(|[r, g, b, a]| {
-            let [r, g, b] = [r, g, b].map(|c| if c >= 0.0 { c.min(1e6) } else { 0.0 });
-            [r, g, b, if a >= 0.0 { a.min(1.0) } else { 0.0 }]
-        });
-        join(&mut self.normals, vertices, normals, added, [0.0; 3]);
-        join(&mut self.uvs, vertices, own_uvs, added, [0.0; 2]);
-        join(&mut self.colors, vertices, colors.collect(), added, [1.0; 4]);
-        if vertices > 0 {
-            triangles.iter_mut().flatten().for_each(|v| *v += vertices as u32);
-            self.triangles.extend(triangles);
-            self.positions.extend(positions);
-        } else {
-            (self.positions, self.triangles) = (positions, triangles);
-        }
-    }
-}
-
-/// The bytes of numbers, for a key.
-fn numbers(numbers: &[f64]) -> Vec<u8> {
-    numbers.iter().flat_map(|number| number.to_bits().to_le_bytes()).collect()
-}
-
-/// Says why nothing of a mesh can be hit.
-fn advise_nothing(cx: &mut CompileContext, data: &MeshData) {
-    let (triangles, corners) = (data.triangles.len(), data.triangles.iter().flatten());
-    let finite = corners.map(|v| Vec3::from(data.positions[*v as usize])).filter(|p| p.is_finite());
-    let bounds = finite.map(|p| (p, p)).reduce(|(low, high), (p, _)| (low.min(p), high.max(p)));
-    let message = match bounds {
-        None => format!("none of its {triangles} triangles has a corner that is finite: nothing of it can be seen"),
-        Some((low, high)) if low == high => {
-            let place = show(&(low.as_dvec3() + DVec3::from(data.origin)).to_array());
-            format!("it has no size, all of its {triangles} triangles are at {place}: nothing of it can be seen")
-        }
-        Some(_) => format!("none of its {triangles} triangles has an area: nothing of it can be seen"),
-    };
-    cx.advise("", message, Some("look at it in the program that wrote it"));
-}
-
-/// The box around all positions that are numbers, moved by `transform`.
-fn bounds(data: &MeshData, transform: Option<DAffine3>) -> Option<[DVec3; 2]> {
-    let (origin, world_from_mesh) = (DVec3::from(data.origin), transform.unwrap_or(DAffine3::IDENTITY));
-    let mut bounds: Option<[DVec3; 2]> = None;
-    for p in &data.positions {
-        let p = Vec3::from(*p).as_dvec3();
-        if p.is_finite() {
-            let p = world_from_mesh.transform_point3(p + origin);
-            bounds = Some(bounds.map_or([p; 2], |[low, high]| [low.min(p), high.max(p)]));
-        }
-    }
-    bounds
-}
-
-/// Moves positions and normals, in f64; positions then count from `origin`.
-fn move_mesh(data: &mut MeshData, transform: Option<DAffine3>, origin: DVec3) {
-    let own = DVec3::from(data.origin);
-    let is_shifted = own != DVec3::ZERO || origin != DVec3::ZERO;
-    if transform.is_none() && !is_shifted {
-        return;
-    }
-    let mut transform = transform.unwrap_or(DAffine3::IDENTITY);
-    if is_shifted {
-        transform.translation = transform.transform_point3(own) - origin;
-    }
-    let placement = Placement::new(transform);
-    for p in &mut data.positions {
-        *p = transform.transform_point3(Vec3::from(*p).as_dvec3()).as_vec3().into();
-    }
-    for n in &mut data.normals {
-        let moved = placement.normal(Vec3::from(*n).as_dvec3()).normalize_or_zero();
-        *n = moved.as_vec3().into();
-    }
-    // A mirror turns the corners of every face around
-    if transform.matrix3.determinant() < 0.0 {
-        data.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     }
 }

@@ -8,7 +8,7 @@ use crate::ids::MaterialId;
 use crate::math::{DVec3, ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3};
 use crate::shape::TriangleTree;
 use crate::shape::placement::Placement;
-use crate::shape::surface::{Footprint, RayDifferential, ShadowTerminator, ShapePoint, UvEdge};
+use crate::shape::surface::{Footprint, RayDifferential, ShadowTerminator, ShapePoint, TexturePoint, UvEdge};
 use crate::shape::triangles::{can_be_hit, is_in_plane};
 
 /// The meshes of one space, the world or that of a group, joined: one tree for all their triangles.
@@ -32,6 +32,8 @@ pub(crate) struct Mesh {
 pub(crate) struct JoinedPart {
     /// Its first triangle; it ends where the next begins.
     pub first_triangle: u32,
+    /// Its first vertex.
+    pub first_vertex: u32,
     /// Its surface, counted from that of the group it lies in.
     pub surface: u32,
     /// The material of each triangle, as an index of `materials`; empty where there is one for all.
@@ -44,6 +46,19 @@ pub(crate) struct JoinedPart {
     pub has_uvs: bool,
     /// Of each triangle, where a normal map is on it; empty where none is.
     pub tangents: Vec<CornerTangents>,
+    /// The sets of texture coordinates, other than the one that the mesh chooses, that textures on it name.
+    pub uv_sets: Vec<NamedUvSet>,
+}
+
+/// A set of texture coordinates that textures of a mesh name.
+#[derive(Clone, Debug)]
+pub(crate) struct NamedUvSet {
+    /// Its number in the mesh, counted from 0.
+    pub number: u8,
+    /// For each vertex of the part.
+    pub uvs: Vec<[f32; 2]>,
+    /// Of each triangle, where a normal map is laid by the set; empty where none is.
+    pub tangents: Vec<CornerTangents>,
 }
 
 impl JoinedPart {
@@ -51,6 +66,13 @@ impl JoinedPart {
     pub fn number(&self, triangle: u32) -> u32 {
         let own = triangle - self.first_triangle;
         self.numbers.get(own as usize).copied().unwrap_or(own)
+    }
+
+    /// A set of texture coordinates, if it is not the one that the mesh chooses.
+    #[inline(always)]
+    pub fn named_set(&self, set: Option<u8>) -> Option<&NamedUvSet> {
+        let number = set?;
+        self.uv_sets.iter().find(|set| set.number == number)
     }
 
     /// The material of a triangle of the joined mesh.
@@ -98,9 +120,9 @@ impl Mesh {
         ((a * weights[0] + b * weights[1] + c * weights[2]) as f32).clamp(0.0, 1.0)
     }
 
-    /// The texture coordinate at a point.
-    pub fn uv(&self, at: TrianglePoint) -> Vec2 {
-        let corners = self.corner_uvs(at.triangle);
+    /// The texture coordinate of a set at a point; `None`: the set that the mesh chooses.
+    pub fn uv(&self, at: TrianglePoint, set: Option<u8>) -> Vec2 {
+        let corners = self.corner_uvs(at.triangle, set);
         let (f1, f2) = (corners[1] - corners[0], corners[2] - corners[0]);
         (corners[0] + f1 * f64::from(at.u) + f2 * f64::from(at.v)).as_vec2()
     }
@@ -112,8 +134,11 @@ impl Mesh {
             + size_of_val(self.normals.as_slice())
             + size_of_val(self.uvs.as_slice())
             + size_of_val(self.colors.as_slice());
-        let of_part =
-            |part: &JoinedPart| size_of_val(part.face_materials.as_slice()) + size_of_val(part.tangents.as_slice());
+        let of_set = |set: &NamedUvSet| size_of_val(set.uvs.as_slice()) + size_of_val(set.tangents.as_slice());
+        let of_part = |part: &JoinedPart| {
+            let sets = part.uv_sets.iter().map(of_set).sum::<usize>();
+            size_of_val(part.face_materials.as_slice()) + size_of_val(part.tangents.as_slice()) + sets
+        };
         lists + self.parts.iter().map(of_part).sum::<usize>()
     }
 
@@ -211,7 +236,6 @@ impl Mesh {
         terminator: ShadowTerminator,
     ) -> ShapePoint {
         let corners = self.corners(at.triangle);
-        let (u, v) = (at.u as f64, at.v as f64);
         let weights = weights(at);
         let own = blended(corners, at);
         let (e1, e2) = (corners[1] - corners[0], corners[2] - corners[0]);
@@ -248,24 +272,8 @@ impl Mesh {
             };
             lifted = round.lift(p, normal * side).map(|p| p.as_vec3());
         }
-        let corner_uvs = self.corner_uvs(at.triangle);
-        let (f1, f2) = (corner_uvs[1] - corner_uvs[0], corner_uvs[2] - corner_uvs[0]);
-        let uv = corner_uvs[0] + f1 * u + f2 * v;
-        let footprint = match differential.is_zero() {
-            true => [Vec2::ZERO; 2],
-            false => {
-                // The dual basis of the edges turns steps on the surface into steps of the weights, and those of uv
-                let cross = w1.cross(w2);
-                let area2 = cross.length_squared();
-                let (u_axis, v_axis) = (w2.cross(cross) / area2, cross.cross(w1) / area2);
-                let steps = differential.on_plane(ray.d, t as f32, normal.as_vec3(), f32::MAX.sqrt() * 0.5);
-                steps.map(|dp| {
-                    let dp = dp.as_dvec3();
-                    let step = f1 * dp.dot(u_axis) + f2 * dp.dot(v_axis);
-                    if step.is_finite() { step.as_vec2() } else { Vec2::ZERO }
-                })
-            }
-        };
+        let TexturePoint { uv, dx, dy } =
+            place_on_texture(self.corner_uvs(at.triangle, None), at, [w1, w2], normal, ray, t, differential);
         let color = if self.colors.is_empty() {
             Rgb::WHITE
         } else {
@@ -283,35 +291,92 @@ impl Mesh {
             normal: normal.as_vec3(),
             shading: shading.as_vec3(),
             lifted,
-            uv: uv.as_vec2(),
-            footprint: Footprint { dx: footprint[0], dy: footprint[1], edges: [UvEdge::Unbounded; 2] },
+            uv,
+            footprint: Footprint { dx, dy, edges: [UvEdge::Unbounded; 2] },
             color,
             alpha,
         }
     }
 
-    /// How a point of a triangle moves with u and with v; the edges where uv has no direction.
-    pub fn tangents(&self, placement: Option<&Placement>, triangle: u32) -> [DVec3; 2] {
+    /// The place on textures that are laid by a set, of the point that `ray` met at `t`: as [`point`](Self::point) has
+    /// it of the set that the mesh chooses.
+    pub fn texture_point(
+        &self,
+        placement: Option<&Placement>,
+        at: TrianglePoint,
+        ray: &Ray,
+        t: f64,
+        differential: &RayDifferential,
+        set: u8,
+    ) -> TexturePoint {
+        let edges = self.edges(placement, at.triangle);
+        let (normal, _) = self.normals(placement, at);
+        place_on_texture(self.corner_uvs(at.triangle, Some(set)), at, edges, normal, ray, t, differential)
+    }
+
+    /// The edges of a triangle from its first corner, in world space.
+    fn edges(&self, placement: Option<&Placement>, triangle: u32) -> [DVec3; 2] {
         let [a, b, c] = self.corners(triangle);
-        let [e1, e2] = [b - a, c - a].map(|e| match placement {
+        [b - a, c - a].map(|e| match placement {
             None => e,
             Some(at) => at.world_from_object.transform_vector3(e),
-        });
-        let [a, b, c] = self.corner_uvs(triangle);
+        })
+    }
+
+    /// How a point of a triangle moves with u and with v of a set; the edges where uv has no direction.
+    pub fn tangents(&self, placement: Option<&Placement>, triangle: u32, set: Option<u8>) -> [DVec3; 2] {
+        let [e1, e2] = self.edges(placement, triangle);
+        let [a, b, c] = self.corner_uvs(triangle, set);
         let (f1, f2) = (b - a, c - a);
         let det = f1.perp_dot(f2);
         if det != 0.0 { [(e1 * f2.y - e2 * f1.y) / det, (e2 * f1.x - e1 * f2.x) / det] } else { [e1, e2] }
     }
 
-    /// The texture coordinates of a triangle's corners; the weights themselves where there are none.
+    /// The texture coordinates of a set of a triangle's corners; `None`: of the set that the mesh chooses. The weights
+    /// themselves where there are none.
     #[inline(always)]
-    fn corner_uvs(&self, triangle: u32) -> [DVec2; 3] {
-        if self.part(triangle).has_uvs {
+    fn corner_uvs(&self, triangle: u32, set: Option<u8>) -> [DVec2; 3] {
+        let part = self.part(triangle);
+        if let Some(NamedUvSet { uvs, .. }) = part.named_set(set) {
+            self.triangles[triangle as usize].map(|i| Vec2::from(uvs[(i - part.first_vertex) as usize]).as_dvec2())
+        } else if part.has_uvs {
             self.triangles[triangle as usize].map(|i| Vec2::from(self.uvs[i as usize]).as_dvec2())
         } else {
             [DVec2::ZERO, DVec2::X, DVec2::Y]
         }
     }
+}
+
+/// The place on a texture of a point of a triangle, from the texture coordinates of its corners, its edges and its normal
+/// in world space.
+#[inline(always)]
+fn place_on_texture(
+    corner_uvs: [DVec2; 3],
+    at: TrianglePoint,
+    [w1, w2]: [DVec3; 2],
+    normal: DVec3,
+    ray: &Ray,
+    t: f64,
+    differential: &RayDifferential,
+) -> TexturePoint {
+    let (f1, f2) = (corner_uvs[1] - corner_uvs[0], corner_uvs[2] - corner_uvs[0]);
+    let uv = corner_uvs[0] + f1 * f64::from(at.u) + f2 * f64::from(at.v);
+    let [dx, dy] = match differential.is_zero() {
+        true => [Vec2::ZERO; 2],
+        false => {
+            // The dual basis of the edges turns steps on the surface into steps of the weights, and those of uv
+            let cross = w1.cross(w2);
+            let area2 = cross.length_squared();
+            let (u_axis, v_axis) = (w2.cross(cross) / area2, cross.cross(w1) / area2);
+            let steps = differential.on_plane(ray.d, t as f32, normal.as_vec3(), f32::MAX.sqrt() * 0.5);
+            steps.map(|dp| {
+                let dp = dp.as_dvec3();
+                let step = f1 * dp.dot(u_axis) + f2 * dp.dot(v_axis);
+                if step.is_finite() { step.as_vec2() } else { Vec2::ZERO }
+            })
+        }
+    };
+    TexturePoint { uv: uv.as_vec2(), dx, dy }
 }
 
 /// A facet that stands for something round, in world space: its corners, the normals there on the viewer's side, and

@@ -90,14 +90,20 @@ pub(super) fn tangents(
 }
 
 impl Mesh {
-    /// What a normal map counts from at a point: the tangents of the corners, blended, or how the point moves with u
-    /// where there are none. `None` where u has no direction.
-    pub fn normal_frame(&self, placement: Option<&Placement>, at: TrianglePoint) -> Option<NormalFrame> {
+    /// What a normal map that is laid by a set of texture coordinates counts from at a point: the tangents of the
+    /// corners, blended, or how the point moves with u where there are none. `None` where u has no direction.
+    pub fn normal_frame(
+        &self,
+        placement: Option<&Placement>,
+        at: TrianglePoint,
+        set: Option<u8>,
+    ) -> Option<NormalFrame> {
         let (normal, of_corners) = self.normals(placement, at);
         let front = of_corners.unwrap_or(normal);
-        let dp = self.tangents(placement, at.triangle);
+        let dp = self.tangents(placement, at.triangle, set);
         let part = self.part(at.triangle);
-        let stored = part.tangents.get((at.triangle - part.first_triangle) as usize);
+        let tangents = part.named_set(set).map_or(&part.tangents, |named| &named.tangents);
+        let stored = tangents.get((at.triangle - part.first_triangle) as usize);
         self.stored_frame(placement, at, stored, front, dp).or_else(|| NormalFrame::new(front, dp))
     }
 
