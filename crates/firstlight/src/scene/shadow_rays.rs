@@ -7,7 +7,7 @@ use super::occluders::Opacity;
 use crate::accel::{Aabb, RayPacket16, TraceRay, dispatch_all, dispatch_eight, dispatch_sixteen};
 use crate::ids::{LightId, SurfaceId};
 use crate::math::{DVec3, ShadowRay, Vec3};
-use crate::shape::{LineLanes, Mesh, Placement, bits};
+use crate::shape::{LineLanes, Mesh, PacketHits, Placement, bits};
 
 /// Sixteen rays from one surface, or from sixteen places, towards a light, each ending at a point of it.
 pub(crate) struct ShadowRays<'a> {
@@ -151,7 +151,8 @@ impl<'a> ShadowMesh<'a> {
         }
         let own = self.own_rays(&shadows.rays, active);
         let rays = own.as_ref().unwrap_or(&shadows.rays);
-        let may_block = |triangle, hit: u64| {
+        let may_block = |hits: &PacketHits| {
+            let (triangle, hit) = (hits.triangle, hits.lanes);
             if !self.casts(triangle) {
                 return 0;
             }

@@ -11,7 +11,7 @@ use super::shadow_rays::{ShadowMesh, ShadowRays};
 use crate::accel::{TraceRay, dispatch_eight, dispatch_sixteen};
 use crate::ids::SurfaceId;
 use crate::math::{DRay, LANES, Ray, ShadowRay};
-use crate::shape::{RayDifferential, ShadowTerminator, TrianglePoint, bits};
+use crate::shape::{PacketHits, RayDifferential, ShadowTerminator, TrianglePoint, bits};
 
 /// What is left of light by the layers on a ray.
 struct Veils<'a> {
@@ -79,13 +79,15 @@ impl Scene {
 type LaneVeils<'a, 'b> = RefCell<&'a mut [Veils<'b>; LANES]>;
 
 impl Veils<'_> {
-    /// Adds a layer; whether it stops all light.
-    fn add(&mut self, hit: Hit) -> bool {
+    /// Adds a layer, unless the ray starts on it: whether it stops all light. Most layers that are not opaque are holes,
+    /// for which `is_start` is not computed.
+    #[inline]
+    fn add(&mut self, hit: Hit, is_start: impl FnOnce() -> bool) -> bool {
         let Veils { scene, ray, factors } = self;
         let geometry = &*scene.geometry;
         let surface = &geometry.surfaces[hit.surface.index()];
         let material = surface.material.unwrap_or_else(|| geometry.face_material(&hit));
-        let Some(alpha) = scene.alpha_of(material) else { return true };
+        let Some(alpha) = scene.alpha_of(material) else { return !is_start() };
         let alpha = match hit.at {
             At::Placed(index, PlacedSpot::Triangle(point)) => {
                 let PlacedTarget::Mesh(mesh) = geometry.placed[index as usize].target else { return false };
@@ -98,7 +100,10 @@ impl Veils<'_> {
                 alpha.at_point(|_| point.uv, point.alpha, &scene.textures)
             }
         };
-        if alpha > 0.0 && alpha < 1.0 {
+        if alpha <= 0.0 || is_start() {
+            return false;
+        }
+        if alpha < 1.0 {
             let primitive = geometry.primitive(&hit).unwrap_or(0);
             factors.push(LayerFactor { hit, primitive, left: 1.0 - alpha });
         }
@@ -177,23 +182,22 @@ impl Geometry {
         };
         let own = mesh.own_rays(&shadows.rays, active);
         let rays = own.as_ref().unwrap_or(&shadows.rays);
-        let stops = |triangle, hit: u64| {
+        let stops = |hits: &PacketHits| {
+            let triangle = hits.triangle;
             if !mesh.casts(triangle) {
                 return 0;
             }
             let veils = &mut *veils.borrow_mut();
-            let corners = mesh.mesh.corners(triangle).map(|corner| corner.as_vec3());
             let surface = SurfaceId(thing.surface.0 + mesh.mesh.part(triangle).surface);
             let is_stopped = |lane: &usize| {
                 let ray = &mut veils[*lane];
-                !mesh.is_start(ray.ray, rays.o(*lane), triangle)
-                    && mesh.mesh.tree.meet(&rays.ray(*lane), &corners, triangle).is_some_and(|hit| {
-                        let point = TrianglePoint { triangle, u: hit.u, v: hit.v };
-                        let at = At::Placed(index, PlacedSpot::Triangle(point));
-                        ray.add(Hit { t: f64::from(hit.t), surface, at })
-                    })
+                let point = TrianglePoint { triangle, u: hits.u[*lane], v: hits.v[*lane] };
+                let at = At::Placed(index, PlacedSpot::Triangle(point));
+                let from = ray.ray;
+                let is_start = || mesh.is_start(from, rays.o(*lane), triangle);
+                ray.add(Hit { t: f64::from(hits.t[*lane]), surface, at }, is_start)
             };
-            bits(hit).filter(is_stopped).fold(0, |stopped, lane| stopped | 1 << lane)
+            bits(hits.lanes).filter(is_stopped).fold(0, |stopped, lane| stopped | 1 << lane)
         };
         simd.vectorize(
             #[inline(always)]
@@ -216,7 +220,7 @@ impl Geometry {
                         .crossings(&line, within, false)
                         .into_iter()
                         .flatten()
-                        .any(|t| veils.add(Hit { t, surface: owned.surface, at: At::Sphere(i) }))
+                        .any(|t| veils.add(Hit { t, surface: owned.surface, at: At::Sphere(i) }, || false))
             }
             UpperItem::Parallelogram(i) => {
                 let owned = &self.parallelograms[i as usize];
@@ -224,7 +228,7 @@ impl Geometry {
                 self.casts(owned.surface, ray.to.light)
                     // As with opaque parallelograms, a coplanar one does not block the ray
                     && owned.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite())
-                    && veils.add(Hit { t: crossing(), surface: owned.surface, at: At::Parallelogram(i) })
+                    && veils.add(Hit { t: crossing(), surface: owned.surface, at: At::Parallelogram(i) }, || false)
             }
             UpperItem::Placed(_) => false,
         }
@@ -246,27 +250,31 @@ impl Geometry {
                     #[inline(always)]
                     || {
                         mesh.mesh.tree.each(simd, &TraceRay::new(o, d), end, |hit| {
-                            if !mesh.casts(hit.triangle) || mesh.is_start(ray, o, hit.triangle) {
+                            if !mesh.casts(hit.triangle) {
                                 return false;
                             }
                             let surface = SurfaceId(thing.surface.0 + mesh.mesh.part(hit.triangle).surface);
                             let point = TrianglePoint { triangle: hit.triangle, u: hit.u, v: hit.v };
                             let at = At::Placed(index, PlacedSpot::Triangle(point));
-                            veils.add(Hit { t: f64::from(hit.t), surface, at })
+                            let is_start = || mesh.is_start(ray, o, hit.triangle);
+                            veils.add(Hit { t: f64::from(hit.t), surface, at }, is_start)
                         })
                     },
                 )
             }
             PlacedTarget::Points(points) => {
                 self.point_sets[points as usize].each(simd, &own, end, false, |t, point| {
-                    veils.add(Hit { t, surface: thing.surface, at: At::Placed(index, PlacedSpot::Point(point)) })
+                    veils
+                        .add(Hit { t, surface: thing.surface, at: At::Placed(index, PlacedSpot::Point(point)) }, || {
+                            false
+                        })
                 })
             }
             PlacedTarget::Solid(solid) => {
                 let mut after = 0.0;
                 while let Some(hit) = self.solids[solid as usize].intersect(&own, after, end.into(), false) {
                     let at = At::Placed(index, PlacedSpot::Part(hit.part));
-                    if veils.add(Hit { t: hit.t, surface: thing.surface, at }) {
+                    if veils.add(Hit { t: hit.t, surface: thing.surface, at }, || false) {
                         return true;
                     }
                     after = hit.t;

@@ -58,7 +58,7 @@ pub(crate) use point_set::PointSet;
 pub(crate) use solid::{Canonical, LineLanes, Solid, SolidHit};
 pub(crate) use sphere::SphereShadow;
 pub(crate) use surface::{ShapePoint, TexturePoint, UV_SETS};
-pub(crate) use triangles::{Eye, SeenParts, SeenTriangle, TOGETHER, TileHits, TriangleTree, bits, every};
+pub(crate) use triangles::{Eye, PacketHits, SeenParts, SeenTriangle, TOGETHER, TileHits, TriangleTree, bits, every};
 
 use crate::describe::family;
 use crate::transform::TransformDesc;

@@ -75,15 +75,8 @@ impl Pyramid {
 
     /// The share of a mask that is solid over a footprint; where it is magnified, 0 or 1.
     pub(super) fn share(&self, filter: Filter, place: &TexturePlace, beyond: &Beyond) -> f32 {
-        let Some((numbers, cutoff)) = &self.mask else { return self.value(filter, place, beyond)[0] };
-        let finest = || {
-            let at = place.at;
-            let number = match filter {
-                Filter::Nearest => numbers.nearest(at, beyond, &self.tables),
-                _ => numbers.bilinear(at, beyond, &self.tables),
-            };
-            if number[0] >= *cutoff { 1.0 } else { 0.0 }
-        };
+        let Some((_, cutoff)) = &self.mask else { return self.value(filter, place, beyond)[0] };
+        let finest = || if self.is_solid(filter, place.at, beyond) { 1.0 } else { 0.0 };
         let radius = EllipseAxes::of(&place.steps).map_or(f64::INFINITY, |axes| axes.major.length());
         if radius <= MAGNIFIED || matches!(filter, Filter::Nearest | Filter::Bilinear) {
             return finest();
@@ -92,6 +85,18 @@ impl Pyramid {
         let share = self.value(filter, place, &Beyond { border: [solid; 4], ..*beyond })[0];
         let part = (2.0 * radius - 1.0).min(1.0) as f32;
         if part < 1.0 { finest() * (1.0 - part) + share * part } else { share }
+    }
+
+    /// Whether a mask is solid at a place, in texels, of the finest level.
+    #[inline]
+    pub(super) fn is_solid(&self, filter: Filter, at: DVec2, beyond: &Beyond) -> bool {
+        self.mask.as_ref().is_some_and(|(numbers, cutoff)| {
+            let number = match filter {
+                Filter::Nearest => numbers.nearest(at, beyond, &self.tables)[0],
+                _ => numbers.bilinear_number(at, beyond, &self.tables),
+            };
+            number >= *cutoff
+        })
     }
 
     fn bilinear(&self, level: usize, at: DVec2, beyond: &Beyond) -> [f32; 4] {
@@ -283,6 +288,30 @@ impl Level {
         let (i, j) = (i as i64, j as i64);
         of_texels!(&self.texels, texels => {
             let texel = |i, j| self.at(texels, i, j, beyond, tables);
+            let row = |j: i64| mix(texel(i, j), texel(i.saturating_add(1), j), s);
+            mix(row(j), row(j.saturating_add(1)), t)
+        })
+    }
+
+    /// The first number of [`bilinear`](Self::bilinear).
+    #[inline]
+    fn bilinear_number(&self, at: DVec2, beyond: &Beyond, tables: &Tables) -> f32 {
+        let (x, y) = (at.x - 0.5, at.y - 0.5);
+        let (i, j) = (floor(x), floor(y));
+        let (s, t) = ((x - i) as f32, (y - j) as f32);
+        let (i, j) = (i as i64, j as i64);
+        let mix = |a: f32, b: f32, part: f32| a * (1.0 - part) + b * part;
+        of_texels!(&self.texels, texels => {
+            // Away from the edges no texel is wrapped
+            if (0..self.width as i64 - 1).contains(&i) && (0..self.height as i64 - 1).contains(&j) {
+                let columns = [Level::column(i as usize), Level::column(i as usize + 1)];
+                let row = |j: usize| {
+                    let [a, b] = columns.map(|column| texels[self.row(j) + column].read(tables)[0]);
+                    mix(a, b, s)
+                };
+                return mix(row(j as usize), row(j as usize + 1), t);
+            }
+            let texel = |i, j| self.at(texels, i, j, beyond, tables)[0];
             let row = |j: i64| mix(texel(i, j), texel(i.saturating_add(1), j), s);
             mix(row(j), row(j.saturating_add(1)), t)
         })

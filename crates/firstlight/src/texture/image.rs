@@ -154,16 +154,21 @@ impl ImageTexture {
     }
 
     /// Of a picture for a mask: whether it is solid at a point.
-    #[allow(dead_code, reason = "materials with masks come next")]
     pub(crate) fn is_solid(&self, uv: Vec2) -> bool {
-        let none = Footprint { dx: Vec2::ZERO, dy: Vec2::ZERO, edges: [UvEdge::Unbounded; 2] };
-        self.value(uv, &none, 1.0)[0] >= 0.5
+        self.pyramid.is_solid(self.filter, self.texels_at(uv), &self.beyond)
+    }
+
+    /// A texture coordinate in texels of the picture, whose row 0 is v = 1. In f64: a repeated picture has coordinates
+    /// far from 0.
+    #[inline(always)]
+    fn texels_at(&self, uv: Vec2) -> DVec2 {
+        let [width, height] = self.pyramid.size().map(f64::from);
+        let at = self.turn * uv.as_dvec2() + self.offset;
+        DVec2::new(at.x * width, (1.0 - at.y) * height)
     }
 
     fn place(&self, uv: Vec2, footprint: &Footprint, scale: f32) -> TexturePlace {
-        // In texels; row 0 of the picture is v = 1. In f64: a repeated picture has coordinates far from 0
         let size = self.pyramid.size().map(f64::from);
-        let at = self.turn * uv.as_dvec2() + self.offset;
         let step = |step: Vec2| self.turn * (step.as_dvec2() * f64::from(scale)) * DVec2::new(size[0], -size[1]);
         // Where the surface ends, nothing beyond counts
         let within = [0, 1].map(|axis| {
@@ -176,11 +181,7 @@ impl ImageTexture {
             });
             Some([ends[0].min(ends[1]), ends[0].max(ends[1])])
         });
-        TexturePlace {
-            at: DVec2::new(at.x * size[0], (1.0 - at.y) * size[1]),
-            steps: [step(footprint.dx), step(footprint.dy)],
-            within,
-        }
+        TexturePlace { at: self.texels_at(uv), steps: [step(footprint.dx), step(footprint.dy)], within }
     }
 }
 

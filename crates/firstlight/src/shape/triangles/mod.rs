@@ -16,7 +16,7 @@ use crate::accel::{
     Aabb, Beam, Built, LEAF, LaneSlabs, RayPacket16, RayTile, Slabs, TraceRay, Tree, build, dispatch_eight,
     dispatch_sixteen, groups,
 };
-use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
+use crate::math::{DVec3, LANES, UNIT_ROUNDOFF, Vec3};
 use kernel::{Crossing, Crossings, intersect, intersect_lanes};
 pub(crate) use seen::{Eye, SeenParts, SeenTriangle, TOGETHER};
 
@@ -58,6 +58,27 @@ pub(crate) struct TriangleHit {
     pub v: f32,
     /// The triangle's number in the mesh.
     pub triangle: u32,
+}
+
+/// Where rays of a packet meet a triangle.
+pub(crate) struct PacketHits {
+    /// The triangle's number in the mesh.
+    pub triangle: u32,
+    /// The rays that do, as bits.
+    pub lanes: u64,
+    /// As in [`TriangleHit`], of those rays.
+    pub t: [f32; LANES],
+    pub u: [f32; LANES],
+    pub v: [f32; LANES],
+}
+
+impl PacketHits {
+    /// Of one ray alone.
+    #[inline(always)]
+    fn one(hit: TriangleHit, lane: usize) -> PacketHits {
+        let TriangleHit { t, u, v, triangle } = hit;
+        PacketHits { triangle, lanes: 1 << lane, t: [t; LANES], u: [u; LANES], v: [v; LANES] }
+    }
 }
 
 /// Where the rays of a tile meet anything, as far as is known.
@@ -315,12 +336,6 @@ impl TriangleTree {
         self.any_below(simd, 0, ray, &self.slabs(ray), t_max, &mut |hit| filter(hit.triangle))
     }
 
-    /// Where a ray meets a triangle with these corners, which it is known to meet.
-    pub fn meet(&self, ray: &TraceRay, corners: &[Vec3; 3], triangle: u32) -> Option<TriangleHit> {
-        let Crossing { t, u, v } = intersect(ray, &self.slabs(ray), corners)?;
-        Some(TriangleHit { t, u, v, triangle })
-    }
-
     /// Visits every triangle on a ray, 0 < t <= `t_max`, in no order, until `hit` says so: whether it did.
     #[inline(always)]
     pub fn each<S: Simd>(&self, simd: S, ray: &TraceRay, t_max: f32, mut hit: impl FnMut(TriangleHit) -> bool) -> bool {
@@ -367,8 +382,8 @@ impl TriangleTree {
         )
     }
 
-    /// Which of the rays in `active` meet any triangle, 0 < t <= `t_max` of each. `filter` hears of a triangle and of
-    /// rays that meet it, and says for which of them it counts.
+    /// Which of the rays in `active` meet any triangle, 0 < t <= `t_max` of each. `filter` takes where rays meet a
+    /// triangle, and returns those of them for which that counts.
     #[inline(always)]
     pub fn any16<S: Simd>(
         &self,
@@ -376,13 +391,13 @@ impl TriangleTree {
         rays: &RayPacket16,
         t_max: &[f32; 16],
         active: u16,
-        filter: &impl Fn(u32, u64) -> u64,
+        filter: &impl Fn(&PacketHits) -> u64,
     ) -> u16 {
         let mut done = 0;
+        let one = |hit: TriangleHit, lane: usize| filter(&PacketHits::one(hit, lane)) != 0;
         if S::f32s::LEN < WIDE {
             for place in bits(u64::from(active)) {
-                done |= u16::from(self.any(simd, &rays.ray(place), t_max[place], &|id| filter(id, 1 << place) != 0))
-                    << place;
+                done |= u16::from(self.each(simd, &rays.ray(place), t_max[place], |hit| one(hit, place))) << place;
             }
             return done;
         }
@@ -392,9 +407,7 @@ impl TriangleTree {
             }
             if group.count_ones() < FEW {
                 for place in bits(group) {
-                    done |=
-                        u16::from(self.any(simd, &rays.ray(place), t_max[place], &|id| filter(id, 1 << place) != 0))
-                            << place;
+                    done |= u16::from(self.each(simd, &rays.ray(place), t_max[place], |hit| one(hit, place))) << place;
                 }
                 continue;
             }
@@ -419,15 +432,24 @@ impl TriangleTree {
                         }
                         let Some(met) = intersect_lanes(simd, &lanes, along(pack, place, beam.axes)) else { continue };
                         let mut hit = (met.mask & met.t.simd_gt(zero) & met.t.simd_le(reach)).to_bitmask();
-                        for lane in bits(met.unsure & asking) {
+                        let exact = |lane: usize| {
                             let ray = rays.ray(lane);
-                            let met = intersect(&ray, &self.slabs(&ray), &pack.triangle(place));
-                            let is_hit = met.is_some_and(|met| met.t > 0.0 && met.t <= t_max[lane]);
-                            hit = hit & !(1 << lane) | u64::from(is_hit) << lane;
+                            let met = intersect(&ray, &self.slabs(&ray), &pack.triangle(place))?;
+                            (met.t > 0.0 && met.t <= t_max[lane]).then_some(met)
+                        };
+                        for lane in bits(met.unsure & asking) {
+                            hit = hit & !(1 << lane) | u64::from(exact(lane).is_some()) << lane;
                         }
                         hit &= asking & !done;
                         if hit != 0 {
-                            done |= filter(id, hit);
+                            let [t, u, v] = [met.t, met.v / met.det, met.w / met.det].map(|n| n.to_array());
+                            let mut hits = PacketHits { triangle: id, lanes: hit, t, u, v };
+                            for lane in bits(met.unsure & hit) {
+                                if let Some(met) = exact(lane) {
+                                    (hits.t[lane], hits.u[lane], hits.v[lane]) = (met.t, met.u, met.v);
+                                }
+                            }
+                            done |= filter(&hits);
                             if asking == done {
                                 break;
                             }
@@ -440,10 +462,8 @@ impl TriangleTree {
                     let mut done = 0;
                     for lane in bits(asking) {
                         let ray = rays.ray(lane);
-                        let counts = |id| filter(id, 1 << lane) != 0;
-                        let is_hit = self.any_below(simd, child, &ray, &self.slabs(&ray), t_max[lane], &mut |hit| {
-                            counts(hit.triangle)
-                        });
+                        let counts = &mut |hit| one(hit, lane);
+                        let is_hit = self.any_below(simd, child, &ray, &self.slabs(&ray), t_max[lane], counts);
                         done |= u64::from(is_hit) << lane;
                     }
                     done
@@ -627,7 +647,7 @@ impl TriangleTree {
         active: u16,
         filter: &impl Fn(u32) -> bool,
     ) -> u16 {
-        let lanes = |id, lanes| if filter(id) { lanes } else { 0 };
+        let lanes = |hits: &PacketHits| if filter(hits.triangle) { hits.lanes } else { 0 };
         dispatch_sixteen!(level, simd => self.any16(simd, rays, t_max, active, &lanes), else {
             let hit = |place: &usize| self.any_at(level, &rays.ray(*place), t_max[*place], filter);
             bits(u64::from(active)).filter(hit).fold(0, |hits, place| hits | 1 << place)
