@@ -142,6 +142,11 @@ impl ShadowRay {
         self.l
     }
 
+    /// Its line.
+    pub(crate) fn line(&self) -> Ray {
+        Ray { o: self.start, d: self.l }
+    }
+
     /// The light it leads to.
     pub fn light(&self) -> LightId {
         self.to.light

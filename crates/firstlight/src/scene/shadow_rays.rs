@@ -21,7 +21,7 @@ pub(crate) struct ShadowRays<'a> {
 
 impl ShadowRays<'_> {
     /// The surface that a ray leaves.
-    fn origin(&self, lane: usize) -> &ShadowRay {
+    pub fn origin(&self, lane: usize) -> &ShadowRay {
         &self.from[lane.min(self.from.len() - 1)]
     }
 

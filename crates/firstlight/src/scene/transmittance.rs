@@ -13,16 +13,16 @@ use crate::ids::SurfaceId;
 use crate::math::{DRay, LANES, Ray, ShadowRay};
 use crate::shape::{PacketHits, RayDifferential, ShadowTerminator, TrianglePoint, bits};
 
-/// What is left of light by the layers on a ray.
+/// What is left of light by the layers on up to sixteen rays.
 struct Veils<'a> {
     scene: &'a Scene,
-    ray: &'a ShadowRay,
     /// The factors that are neither 0 nor 1.
     factors: Vec<LayerFactor>,
 }
 
-/// What one layer leaves.
+/// What one layer leaves of the light along one ray.
 struct LayerFactor {
+    lane: usize,
     hit: Hit,
     primitive: u32,
     left: f32,
@@ -43,8 +43,12 @@ impl Scene {
 
     #[inline(never)]
     fn product_of_layers(&self, ray: &ShadowRay) -> f32 {
-        let mut veils = Veils { scene: self, ray, factors: Vec::new() };
-        if self.geometry.pass_layers(self.level, &mut veils) { 0.0 } else { veils.product() }
+        let mut veils = Veils { scene: self, factors: Vec::new() };
+        if self.geometry.pass_layers(self.level, &LaneRay { ray, lane: 0 }, &mut veils) {
+            0.0
+        } else {
+            veils.product(0)
+        }
     }
 }
 
@@ -54,36 +58,39 @@ impl Scene {
     #[inline(never)]
     pub(crate) fn left_by_layers16(&self, shadows: &ShadowRays, active: u16) -> [f32; LANES] {
         let geometry = &*self.geometry;
-        let rays: [ShadowRay; LANES] = std::array::from_fn(|lane| shadows.ray(lane));
-        let mut veils = rays.each_ref().map(|ray| Veils { scene: self, ray, factors: Vec::new() });
+        let mut veils = Veils { scene: self, factors: Vec::new() };
         let stopped = dispatch_sixteen!(
             self.level,
             simd => geometry.pass_layers16(simd, shadows, active, &RefCell::new(&mut veils)),
             else {
-                let is_stopped = |lane: &usize| geometry.pass_layers(self.level, &mut veils[*lane]);
-                let lanes = (0..LANES).filter(|lane| active >> lane & 1 == 1);
-                lanes.filter(is_stopped).fold(0, |bits, lane| bits | 1 << lane)
+                one_by_one(active, |lane| {
+                    geometry.pass_layers(self.level, &LaneRay { ray: &shadows.ray(lane), lane }, &mut veils)
+                })
             }
         );
         let mut left = [0.0; LANES];
-        for (lane, (left, veils)) in left.iter_mut().zip(veils).enumerate() {
-            if active >> lane & 1 == 1 && stopped >> lane & 1 == 0 {
-                *left = veils.product();
-            }
+        for lane in bits(u64::from(active & !stopped)) {
+            left[lane] = veils.product(lane);
         }
         left
     }
 }
 
-/// The veils of sixteen rays, for filters of trees, which cannot change what they hold.
-type LaneVeils<'a, 'b> = RefCell<&'a mut [Veils<'b>; LANES]>;
+/// A ray, and its number among those of its veils.
+struct LaneRay<'a> {
+    ray: &'a ShadowRay,
+    lane: usize,
+}
+
+/// Veils for filters of trees, which cannot change what they hold.
+type LaneVeils<'a, 'b> = RefCell<&'a mut Veils<'b>>;
 
 impl Veils<'_> {
     /// Adds a layer, unless the ray starts on it: whether it stops all light. Most layers that are not opaque are holes,
     /// for which `is_start` is not computed.
     #[inline]
-    fn add(&mut self, hit: Hit, is_start: impl FnOnce() -> bool) -> bool {
-        let Veils { scene, ray, factors } = self;
+    fn add(&mut self, lane: usize, hit: Hit, line: impl Fn() -> Ray, is_start: impl FnOnce() -> bool) -> bool {
+        let scene = self.scene;
         let geometry = &*scene.geometry;
         let surface = &geometry.surfaces[hit.surface.index()];
         let material = surface.material.unwrap_or_else(|| geometry.face_material(&hit));
@@ -95,8 +102,7 @@ impl Veils<'_> {
                 alpha.at_point(|set| mesh.uv(point, set), mesh.alpha(point), &scene.textures)
             }
             _ => {
-                let line = Ray { o: ray.start, d: ray.l };
-                let point = geometry.point(&line, &hit, &RayDifferential::default(), ShadowTerminator::Hard);
+                let point = geometry.point(&line(), &hit, &RayDifferential::default(), ShadowTerminator::Hard);
                 alpha.at_point(|_| point.uv, point.alpha, &scene.textures)
             }
         };
@@ -105,20 +111,26 @@ impl Veils<'_> {
         }
         if alpha < 1.0 {
             let primitive = geometry.primitive(&hit).unwrap_or(0);
-            factors.push(LayerFactor { hit, primitive, left: 1.0 - alpha });
+            self.factors.push(LayerFactor { lane, hit, primitive, left: 1.0 - alpha });
         }
         alpha >= 1.0
     }
 
-    /// The product of all factors.
-    fn product(mut self) -> f32 {
+    /// The product of all factors of a ray.
+    #[inline]
+    fn product(&self, lane: usize) -> f32 {
+        if self.factors.is_empty() { 1.0 } else { self.ordered_product(lane) }
+    }
+
+    fn ordered_product(&self, lane: usize) -> f32 {
         let geometry = &*self.scene.geometry;
-        let place = |one: &LayerFactor| (one.hit.surface, one.primitive);
-        self.factors.sort_by(|a, b| place(a).cmp(&place(b)).then_with(|| a.hit.t.total_cmp(&b.hit.t)));
+        let mut factors: Vec<&LayerFactor> = self.factors.iter().filter(|factor| factor.lane == lane).collect();
+        let place = |one: &&LayerFactor| (one.hit.surface, one.primitive);
+        factors.sort_by(|a, b| place(a).cmp(&place(b)).then_with(|| a.hit.t.total_cmp(&b.hit.t)));
         let mut product = 1.0;
-        for (k, factor) in self.factors.iter().enumerate() {
+        for (k, factor) in factors.iter().enumerate() {
             // A surface without a seam is met once on the edges of its triangles
-            let mut before = self.factors[..k].iter().rev().take_while(|one| one.hit.surface == factor.hit.surface);
+            let mut before = factors[..k].iter().rev().take_while(|one| one.hit.surface == factor.hit.surface);
             if !before.any(|one| geometry.are_neighbours(&one.hit, &factor.hit)) {
                 product *= factor.left;
             }
@@ -129,20 +141,20 @@ impl Veils<'_> {
 
 impl Geometry {
     /// Adds the layers on a shadow ray, until one stops all light: whether one does.
-    fn pass_layers(&self, level: Level, veils: &mut Veils) -> bool {
-        dispatch_eight!(level, simd => self.pass_layers_with(simd, veils))
+    fn pass_layers(&self, level: Level, ray: &LaneRay, veils: &mut Veils) -> bool {
+        dispatch_eight!(level, simd => self.pass_layers_with(simd, ray, veils))
     }
 
     #[inline(always)]
-    fn pass_layers_with<S: Simd>(&self, simd: S, veils: &mut Veils) -> bool {
+    fn pass_layers_with<S: Simd>(&self, simd: S, of: &LaneRay, veils: &mut Veils) -> bool {
         let Some(layers) = &self.layers else { return false };
-        let ray = veils.ray;
-        if layers.unbounded.iter().any(|thing| self.pass_placed_layer(simd, *thing, veils)) {
+        let ray = of.ray;
+        if layers.unbounded.iter().any(|thing| self.pass_placed_layer(simd, *thing, of, veils)) {
             return true;
         }
         layers.upper.any(simd, &TraceRay::new(ray.start, ray.l), ray.t_max, |item| match layers.items[item as usize] {
-            item @ (UpperItem::Sphere(_) | UpperItem::Parallelogram(_)) => self.pass_listed_layer(item, veils),
-            UpperItem::Placed(i) => self.pass_placed_layer(simd, i, veils),
+            item @ (UpperItem::Sphere(_) | UpperItem::Parallelogram(_)) => self.pass_listed_layer(item, of, veils),
+            UpperItem::Placed(i) => self.pass_placed_layer(simd, i, of, veils),
         })
     }
 
@@ -158,7 +170,9 @@ impl Geometry {
         done | layers.upper.any16(simd, &shadows.rays, &whole, active & !done, |item, asking| {
             match layers.items[item as usize] {
                 UpperItem::Placed(i) => self.pass_placed_layer16(simd, i, shadows, asking, veils),
-                item => one_by_one(asking, |lane| self.pass_listed_layer(item, &mut veils.borrow_mut()[lane])),
+                item => one_by_one(asking, |lane| {
+                    self.pass_listed_layer(item, &LaneRay { ray: &shadows.ray(lane), lane }, &mut veils.borrow_mut())
+                }),
             }
         })
     }
@@ -174,7 +188,9 @@ impl Geometry {
     ) -> u16 {
         let thing = &self.placed[index as usize];
         let PlacedTarget::Mesh(_) = thing.target else {
-            return one_by_one(active, |lane| self.pass_placed_layer(simd, index, &mut veils.borrow_mut()[lane]));
+            return one_by_one(active, |lane| {
+                self.pass_placed_layer(simd, index, &LaneRay { ray: &shadows.ray(lane), lane }, &mut veils.borrow_mut())
+            });
         };
         let light = shadows.from[0].to.light;
         let Some(mesh) = ShadowMesh::of(self, index + 1, light).filter(|_| self.stops(thing.shadow, light)) else {
@@ -187,15 +203,14 @@ impl Geometry {
             if !mesh.casts(triangle) {
                 return 0;
             }
-            let veils = &mut *veils.borrow_mut();
+            let veils = &mut **veils.borrow_mut();
             let surface = SurfaceId(thing.surface.0 + mesh.mesh.part(triangle).surface);
             let is_stopped = |lane: &usize| {
-                let ray = &mut veils[*lane];
                 let point = TrianglePoint { triangle, u: hits.u[*lane], v: hits.v[*lane] };
                 let at = At::Placed(index, PlacedSpot::Triangle(point));
-                let from = ray.ray;
-                let is_start = || mesh.is_start(from, rays.o(*lane), triangle);
-                ray.add(Hit { t: f64::from(hits.t[*lane]), surface, at }, is_start)
+                let line = || shadows.ray(*lane).line();
+                let is_start = || mesh.is_start(shadows.origin(*lane), rays.o(*lane), triangle);
+                veils.add(*lane, Hit { t: f64::from(hits.t[*lane]), surface, at }, line, is_start)
             };
             bits(hits.lanes).filter(is_stopped).fold(0, |stopped, lane| stopped | 1 << lane)
         };
@@ -207,20 +222,20 @@ impl Geometry {
 
     /// A sphere or a parallelogram of [`pass_layers`](Self::pass_layers).
     #[inline(never)]
-    fn pass_listed_layer(&self, item: UpperItem, veils: &mut Veils) -> bool {
-        let ray = veils.ray;
+    fn pass_listed_layer(&self, item: UpperItem, &LaneRay { ray, lane }: &LaneRay, veils: &mut Veils) -> bool {
+        let line = || ray.line();
         match item {
             UpperItem::Sphere(i) => {
                 let owned = &self.spheres[i as usize];
-                let line = DRay { o: ray.start.as_dvec3(), d: ray.l.as_dvec3() };
+                let exact = DRay { o: ray.start.as_dvec3(), d: ray.l.as_dvec3() };
                 let within = [0.0, f64::from(ray.end())];
                 self.casts(owned.surface, ray.to.light)
                     && owned
                         .shape
-                        .crossings(&line, within, false)
+                        .crossings(&exact, within, false)
                         .into_iter()
                         .flatten()
-                        .any(|t| veils.add(Hit { t, surface: owned.surface, at: At::Sphere(i) }, || false))
+                        .any(|t| veils.add(lane, Hit { t, surface: owned.surface, at: At::Sphere(i) }, line, || false))
             }
             UpperItem::Parallelogram(i) => {
                 let owned = &self.parallelograms[i as usize];
@@ -228,15 +243,16 @@ impl Geometry {
                 self.casts(owned.surface, ray.to.light)
                     // As with opaque parallelograms, a coplanar one does not block the ray
                     && owned.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite())
-                    && veils.add(Hit { t: crossing(), surface: owned.surface, at: At::Parallelogram(i) }, || false)
+                    && veils.add(lane, Hit { t: crossing(), surface: owned.surface, at: At::Parallelogram(i) }, line, || false)
             }
             UpperItem::Placed(_) => false,
         }
     }
 
     #[inline(never)]
-    fn pass_placed_layer<S: Simd>(&self, simd: S, index: u32, veils: &mut Veils) -> bool {
-        let (thing, ray) = (&self.placed[index as usize], veils.ray);
+    fn pass_placed_layer<S: Simd>(&self, simd: S, index: u32, of: &LaneRay, veils: &mut Veils) -> bool {
+        let (thing, &LaneRay { ray, lane }) = (&self.placed[index as usize], of);
+        let line = || ray.line();
         if !self.stops(thing.shadow, ray.to.light) {
             return false;
         }
@@ -257,24 +273,22 @@ impl Geometry {
                             let point = TrianglePoint { triangle: hit.triangle, u: hit.u, v: hit.v };
                             let at = At::Placed(index, PlacedSpot::Triangle(point));
                             let is_start = || mesh.is_start(ray, o, hit.triangle);
-                            veils.add(Hit { t: f64::from(hit.t), surface, at }, is_start)
+                            veils.add(lane, Hit { t: f64::from(hit.t), surface, at }, line, is_start)
                         })
                     },
                 )
             }
             PlacedTarget::Points(points) => {
                 self.point_sets[points as usize].each(simd, &own, end, false, |t, point| {
-                    veils
-                        .add(Hit { t, surface: thing.surface, at: At::Placed(index, PlacedSpot::Point(point)) }, || {
-                            false
-                        })
+                    let at = At::Placed(index, PlacedSpot::Point(point));
+                    veils.add(lane, Hit { t, surface: thing.surface, at }, line, || false)
                 })
             }
             PlacedTarget::Solid(solid) => {
                 let mut after = 0.0;
                 while let Some(hit) = self.solids[solid as usize].intersect(&own, after, end.into(), false) {
                     let at = At::Placed(index, PlacedSpot::Part(hit.part));
-                    if veils.add(Hit { t: hit.t, surface: thing.surface, at }, || false) {
+                    if veils.add(lane, Hit { t: hit.t, surface: thing.surface, at }, line, || false) {
                         return true;
                     }
                     after = hit.t;
