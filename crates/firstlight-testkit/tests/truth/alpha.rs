@@ -386,6 +386,31 @@ fn ids_and_depth_are_of_the_first_layer_that_is_half_there() {
 }
 
 #[test]
+fn light_passes_solids_that_a_mask_leaves_out() {
+    let room = |things: &str| {
+        let text = format!(
+            "[render]\nwidth = 64\nheight = 48\n[camera]\nposition = [0, 3, 6]\nlook_at = [0, 0, 0]\nfov_y_deg = 40\n\
+             [[light.sphere]]\ncenter = [0, 4, 0]\nradius = 0.5\nstrength = 20\n[material.phong.clear]\n\
+             alpha = 0.5\nalpha_mode = \"mask\"\ncutoff = 0.8\n[[parallelogram]]\np = [-3, 0, 3]\n\
+             e0 = [6, 0, 0]\ne1 = [0, 0, -6]\n{things}"
+        );
+        picture(&scene(&text), &one_thread()).pixels
+    };
+    let empty = room("");
+    for thing in [
+        "[[plane]]\npoint = [0, 1, 0]\nnormal = [0.2, 1, 0.1]",
+        "[[box]]\ncenter = [0, 1, 0]\nsize = [3, 0.5, 3]",
+        "[[disk]]\ncenter = [0, 1, 0]\nradius = 2",
+        "[[sphere]]\ncenter = [0, 1, 0]\nradius = 0.8",
+        "[[parallelogram]]\np = [-1, 1, 1]\ne0 = [2, 0, 0]\ne1 = [0, 0.3, -2]",
+    ] {
+        let clear = room(&format!("{thing}\nmaterial = \"clear\"\n"));
+        let off = clear.iter().flatten().zip(empty.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(off < 0.003, "{thing}: {off}");
+    }
+}
+
+#[test]
 fn points_see_a_part_of_a_light_through_a_sheet() {
     let text = format!(
         "{CAMERA}{MATERIALS}[[light.rectangle]]\ncenter = [0, 4, 0]\ne0 = [1, 0, 0]\ne1 = [0, 0, 1]\n\

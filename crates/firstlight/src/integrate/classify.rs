@@ -84,7 +84,9 @@ impl<'a> LightOccluders<'a> {
         all.exact.truncate(MAX_OCCLUDERS);
         for (k, thing) in scene.geometry.placed.iter().enumerate() {
             let PlacedTarget::Solid(solid) = thing.target else { continue };
-            if !scene.geometry.stops(thing.shadow, id) || all.occluders.len() == MAX_OCCLUDERS {
+            // What is not opaque is met by rays only
+            let is_left_out = thing.layered || !scene.geometry.stops(thing.shadow, id);
+            if is_left_out || all.occluders.len() == MAX_OCCLUDERS {
                 continue;
             }
             let solid = scene.geometry.solids[solid as usize];
