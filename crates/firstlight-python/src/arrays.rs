@@ -186,9 +186,9 @@ pub fn restored(dict: &Bound<'_, PyDict>) -> PyResult<MeshData> {
     let whole: Vec<u32> = bytes("triangles")?.as_chunks::<4>().0.iter().map(|n| u32::from_le_bytes(*n)).collect();
     let origin: Vec<f64> = bytes("origin")?.as_chunks::<8>().0.iter().map(|n| f64::from_le_bytes(*n)).collect();
     Ok(MeshData {
-        positions,
         normals: floats("normals")?.as_chunks::<3>().0.to_vec(),
         uvs: uvs.chunks(positions.len().max(1)).map(<[_]>::to_vec).collect(),
+        positions,
         colors: floats("colors")?.as_chunks::<4>().0.to_vec(),
         triangles: whole.as_chunks::<3>().0.to_vec(),
         origin: origin.try_into().map_err(|_| PyValueError::new_err("a stored mesh has no origin"))?,

@@ -54,6 +54,7 @@ def test_faults_of_meshes_name_the_row():
         scene.add_sphere(center=[0, 0, 0], raduis=1)
 
 
+@pytest.mark.filterwarnings("ignore::firstlight.SceneWarning")
 def test_textures_choose_among_several_sets_of_uv():
     one, other = FLOOR[:, [0, 2]] / 8, FLOOR[:, [2, 0]] / 3
 
@@ -81,14 +82,16 @@ def test_textures_choose_among_several_sets_of_uv():
         planes([one, other], {}, {"uv_set": 2})
     with pytest.raises(fl.SceneError, match=r"uv_set: 4 is outside 0 to 3"):
         planes([one, other], {}, {"uv_set": 4})
-    for wrong, words in (([one, other[:3]], ""), (np.zeros((2, 4, 3)), r"uv\[0\].*\(n, 2\)"), (np.zeros((1, 2, 4, 2)), "uv:")):
+    with pytest.raises(ValueError):
+        fl.Scene().add_mesh(FLOOR, FACES, uv=[one, other[:3]])
+    for wrong, words in ((np.zeros((2, 4, 3)), r"uv\[0\].*\(n, 2\)"), (np.zeros((1, 2, 4, 2)), "uv:")):
         with pytest.raises(ValueError, match=words):
             fl.Scene().add_mesh(FLOOR, FACES, uv=wrong)
     bad = np.array([one, other])
     bad[1, 2] = np.nan
     with pytest.raises(fl.SceneError, match=r"uv\[1\]\[2\]: .*NaN"):
         fl.Scene().add_mesh(FLOOR, FACES, uv=bad)
-    with pytest.raises(fl.SceneError, match=r"uv\[1\]: 5 of them for 4 positions|uv\[0\]: 5 of them"):
+    with pytest.raises(fl.SceneError, match=r"uv\[0\]: 5 of them for 4 positions"):
         fl.Scene().add_mesh(FLOOR, FACES, uv=np.zeros((2, 5, 2)))
 
 

@@ -337,6 +337,7 @@ class Scene:
         *,
         counts: Sequence[int] = ...,
         colors: Sequence[Any] = ...,
+        uv_set: int | None = ...,
     ) -> Handle: ...
     def add_image_texture(
         self,
@@ -350,12 +351,14 @@ class Scene:
         scale: Vector = ...,
         rotate_deg: float = ...,
         offset: Vector = ...,
+        uv_set: int | None = ...,
     ) -> Handle: ...
     def add_uv_grid_texture(
         self,
         name: str,
         *,
         counts: Sequence[int] = ...,
+        uv_set: int | None = ...,
     ) -> Handle: ...
     def add_phong_material(
         self,

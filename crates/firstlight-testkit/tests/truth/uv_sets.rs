@@ -1,4 +1,5 @@
-//! Textures that name a set of texture coordinates: the same picture, to the bit, as of meshes that have that set alone.
+//! Textures that name a set of texture coordinates: the same picture, to the bit, as of meshes that have that set
+//! alone.
 
 use firstlight::*;
 

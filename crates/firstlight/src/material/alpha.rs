@@ -48,8 +48,8 @@ impl Alpha {
         bounded(value * self.of_vertex(si.alpha))
     }
 
-    /// The part of a shadow ray that the surface stops where it has such texture coordinates and vertex alpha: 0 or 1 of
-    /// a mask. `uv`: the coordinate of a set that a texture names, or of the one that the mesh chooses. Textures are
+    /// The part of a shadow ray that the surface stops where it has such texture coordinates and vertex alpha: 0 or 1
+    /// of a mask. `uv`: the coordinate of a set that a texture names, or of the one that the mesh chooses. Textures are
     /// read at their finest level.
     pub(crate) fn at_point(&self, uv: impl Fn(Option<u8>) -> Vec2, vertex: f32, textures: &[Texture]) -> f32 {
         if let Some(product) = self.product(&uv, vertex, textures) {

@@ -124,8 +124,8 @@ fn mirroring(ng: Vec3, wo: Vec3, ns: Vec3) -> Vec3 {
 }
 
 impl Geometry {
-    /// What a normal map that is laid by a set of texture coordinates counts from at a hit of a shape whose front normal
-    /// there is `n`. `None` where u has no direction.
+    /// What a normal map that is laid by a set of texture coordinates counts from at a hit of a shape whose front
+    /// normal there is `n`. `None` where u has no direction.
     pub fn normal_frame(&self, ray: &Ray, hit: &Hit, n: Vec3, set: Option<u8>) -> Option<NormalFrame> {
         match hit.at {
             At::World(point) => self.world.as_ref()?.mesh.normal_frame(None, point, set),

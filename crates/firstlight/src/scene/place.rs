@@ -405,11 +405,10 @@ impl Compiler<'_, '_> {
         [number, class]: [u32; 2],
         faces: Vec<MaterialId>,
     ) {
-        if faces.iter().any(|material| self.rules.is_mapped(*material)) {
-            if source.uv_set >= source.data.uvs.len() {
-                let message = "a normal map or bump map is on a mesh without texture coordinates";
-                cx.advise("material", message, Some("each triangle shows one corner of the picture"));
-            }
+        let is_mapped = faces.iter().any(|material| self.rules.is_mapped(*material));
+        if is_mapped && source.uv_set >= source.data.uvs.len() {
+            let message = "a normal map or bump map is on a mesh without texture coordinates";
+            cx.advise("material", message, Some("each triangle shows one corner of the picture"));
         }
         if source.named.own_maps {
             meshes.iter_mut().for_each(|mesh| mesh.has_tangents = true);

@@ -16,6 +16,7 @@ pub use super::geometry::Hit;
 
 /// What a camera ray ends at, in the scene's own coordinates.
 #[derive(Clone, Copy, Debug)]
+#[allow(clippy::large_enum_variant, reason = "there is one of it at a time, for each ray")]
 pub(crate) enum TracedHit {
     /// A surface to be lit.
     Surface(SurfaceInteraction),

@@ -41,8 +41,8 @@ pub struct Footprint {
     pub edges: [UvEdge; 2],
 }
 
-/// How many sets of the texture coordinates of a mesh textures may name. glTF asks programs for two; each takes 24 bytes
-/// of every surface that is seen.
+/// How many sets of the texture coordinates of a mesh textures may name. glTF asks programs for two; each takes 24
+/// bytes of every surface that is seen.
 pub(crate) const UV_SETS: usize = 4;
 
 /// A place on textures: the texture coordinate of one set, and its steps from one ray of the grid to the next, as in

@@ -26,8 +26,8 @@ table! {
         pub counts: [u32; 2] = [8, 8],
         /// The first colour, that of the square at (0, 0), and the second.
         pub colors: [ColorDesc; 2] = [ColorDesc::WHITE, ColorDesc::BLACK],
-        /// Which set of a mesh's texture coordinates the texture is laid by, 0 to 3; without it the mesh's own `uv_set`.
-        /// Shapes of other kinds have set 0 alone.
+        /// Which set of a mesh's texture coordinates the texture is laid by, 0 to 3; without it the mesh's own
+        /// `uv_set`. Shapes of other kinds have set 0 alone.
         pub uv_set: Option<u32> = None,
     }
 }

@@ -17,8 +17,8 @@ table! {
     pub struct UvGridDesc {
         /// Cells along u and along v, 1 to 32 each.
         pub counts: [u32; 2] = [8, 8],
-        /// Which set of a mesh's texture coordinates the texture is laid by, 0 to 3; without it the mesh's own `uv_set`.
-        /// Shapes of other kinds have set 0 alone.
+        /// Which set of a mesh's texture coordinates the texture is laid by, 0 to 3; without it the mesh's own
+        /// `uv_set`. Shapes of other kinds have set 0 alone.
         pub uv_set: Option<u32> = None,
     }
 }

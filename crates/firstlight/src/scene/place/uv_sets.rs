@@ -65,7 +65,10 @@ impl Compiler<'_, '_> {
         for (i, material) in faces.iter().enumerate().filter(|(i, material)| !faces[..*i].contains(material)) {
             let (field, hint) = match &desc.file {
                 Some(_) => ("file".to_owned(), "sets are counted from 0: name one that the file has"),
-                None => (format!("materials[{i}]"), "sets are counted from 0: add it to `more_uvs`, or name another"),
+                None => (
+                    format!("materials[{i}]"),
+                    "`uvs` is set 0, `more_uvs` holds the further ones: add it, or name another",
+                ),
             };
             let field = if named == Some(*material) { "material" } else { &field };
             self.check_uv_sets(cx, field, *material, sets, &format!("the mesh {}", in_words(true, sets)), hint);
@@ -85,7 +88,10 @@ impl Compiler<'_, '_> {
                     continue;
                 };
                 let Some(fewest) = fewest_uv_sets(groups, of, &mut known) else { continue };
-                let (what, hint) = (self.describe_fewest(fewest), "the material of an instance is on all of its group");
+                let (what, hint) = (
+                    self.describe_fewest(fewest),
+                    "an instance puts its material on all of its group: name it at shapes that have the set",
+                );
                 self.check_uv_sets(cx, &format!("{prefix}instance[{i}].material"), material, fewest.sets, &what, hint);
             }
         }

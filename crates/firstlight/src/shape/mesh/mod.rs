@@ -43,7 +43,8 @@ shape_table! {
         pub normals: Vec<[f64; 3]> = Vec::new(),
         /// A texture coordinate for each vertex; without, (0, 0), (1, 0), (0, 1) at the corners of each triangle.
         pub uvs: Vec<[f64; 2]> = Vec::new(),
-        /// Further sets of texture coordinates after `uvs`, which is set 0: of each a texture coordinate for each vertex.
+        /// Further sets of texture coordinates after `uvs`, which is set 0: of each a texture coordinate for each
+        /// vertex.
         pub more_uvs: Vec<Vec<[f64; 2]>> = Vec::new(),
         /// Which set of texture coordinates is used, counted from 0, by all textures that name no set of their own.
         pub uv_set: u32 = 0,

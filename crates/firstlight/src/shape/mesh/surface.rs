@@ -347,8 +347,8 @@ impl Mesh {
     }
 }
 
-/// The place on a texture of a point of a triangle, from the texture coordinates of its corners, its edges and its normal
-/// in world space.
+/// The place on a texture of a point of a triangle, from the texture coordinates of its corners, its edges and its
+/// normal in world space.
 #[inline(always)]
 fn place_on_texture(
     corner_uvs: [DVec2; 3],
