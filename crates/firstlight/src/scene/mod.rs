@@ -23,6 +23,8 @@ mod shadow_rays;
 #[cfg(test)]
 mod tests;
 mod text;
+#[cfg(test)]
+mod texture_tests;
 mod textures;
 mod through;
 mod trace;

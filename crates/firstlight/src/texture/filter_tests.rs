@@ -266,13 +266,32 @@ fn means_of_normals_keep_their_length() {
 fn large_pictures_take_what_is_said() {
     let of = TextureUse::Color(TextureSpace::Srgb);
     assert!(Pyramid::bytes_of([4096, 4096], 4, 1, of) <= 90_000_000);
-    for (size, channels) in [([7, 5], 1), ([64, 32], 2), ([100, 1], 3), ([9, 300], 4)] {
+    let mask = |channel, space| TextureUse::Mask(MaskRule { channel, space, cutoff: 0.5 });
+    let uses = [
+        of,
+        TextureUse::Color(TextureSpace::Raw),
+        TextureUse::CoveredColor(TextureSpace::Srgb),
+        TextureUse::Normal,
+        mask(Channel::G, TextureSpace::Raw),
+        mask(Channel::G, TextureSpace::Srgb),
+        mask(Channel::Luminance, TextureSpace::Raw),
+    ];
+    for size in [[7, 5], [64, 32], [100, 1], [1, 1], [9, 300]] {
         let [width, height] = size;
-        for of in [of, TextureUse::Normal, TextureUse::CoveredColor(TextureSpace::Srgb)] {
-            let data = TexelSamples::U8(vec![9; width as usize * height as usize * channels]);
-            let texels = Texels { width, height, channels, data };
-            let expected = Pyramid::bytes_of(size, channels, 1, of);
-            assert!(Pyramid::new(&texels, of).bytes() <= expected + 2 * expected / 3, "{size:?} {channels}");
+        for channels in 1..=4 {
+            let count = width as usize * height as usize * channels;
+            let samples = [
+                TexelSamples::U8(vec![9; count]),
+                TexelSamples::U16(vec![9; count]),
+                TexelSamples::F32(vec![0.9; count]),
+            ];
+            for (data, sample_bytes) in samples.into_iter().zip([1, 2, 4]) {
+                let texels = Texels { width, height, channels, data };
+                for of in uses {
+                    let said = Pyramid::bytes_of(size, channels, sample_bytes, of);
+                    assert_eq!(said, Pyramid::new(&texels, of).bytes(), "{size:?} {channels} {sample_bytes} {of:?}");
+                }
+            }
         }
     }
 }

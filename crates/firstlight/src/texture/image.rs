@@ -78,8 +78,8 @@ table! {
         pub rotate_deg: f64 = 0.0,
         /// Added to the coordinate, after all else; each number from -1e6 to 1e6.
         pub offset: [f64; 2] = [0.0, 0.0],
-        /// Which set of a mesh's texture coordinates the texture is laid by, 0 to 3; without it the mesh's own `uv_set`.
-        /// Shapes of other kinds have set 0 alone.
+        /// Which set of a mesh's texture coordinates the texture is laid by, 0 to 3; without it the mesh's own
+        /// `uv_set`. Shapes of other kinds have set 0 alone.
         pub uv_set: Option<u32> = None,
     }
 }
@@ -131,6 +131,12 @@ const MAX_SCALE: f64 = 1e6;
 const MAX_TURN: f64 = 36000.0;
 
 impl ImageTexture {
+    /// Its texels.
+    #[cfg(test)]
+    pub(crate) fn pyramid(&self) -> &Arc<Pyramid> {
+        &self.pyramid
+    }
+
     /// Red, green, blue and alpha at `uv`, over a footprint that is `scale` times as large.
     pub fn value(&self, uv: Vec2, footprint: &Footprint, scale: f32) -> [f32; 4] {
         let place = self.place(uv, footprint, scale);

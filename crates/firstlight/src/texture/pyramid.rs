@@ -37,6 +37,11 @@ pub(crate) struct MaskRule {
 }
 
 impl MaskRule {
+    /// Whether the numbers that decide are those of a picture of 8 bits as they are.
+    fn keeps_bytes(&self) -> bool {
+        self.channel != Channel::Luminance && self.space == TextureSpace::Raw
+    }
+
     /// The number that decides, of red, green, blue and alpha.
     pub(crate) fn number(&self, value: [f32; 4]) -> f32 {
         number(value, self.channel)
@@ -93,7 +98,7 @@ impl Pyramid {
         let tables = Tables::new(TextureSpace::Raw);
         let numbers = match texels.data {
             // As exact as it is stored
-            TexelSamples::U8(_) if rule.channel != Channel::Luminance && rule.space == TextureSpace::Raw => {
+            TexelSamples::U8(_) if rule.keeps_bytes() => {
                 Level::new(size, Stored::Gray8, |i, j| u8::write([number(i, j); 4], &tables))
             }
             _ => Level::new(size, Stored::Gray16, |i, j| u16::write([number(i, j).clamp(0.0, 1.0); 4], &tables)),
@@ -120,8 +125,9 @@ impl Pyramid {
         let (first, smaller) = match of {
             TextureUse::Color(_) | TextureUse::CoveredColor(_) if sample_bytes == 4 => (16, 16),
             TextureUse::Color(_) | TextureUse::CoveredColor(_) => (stored * sample_bytes, stored * sample_bytes),
-            TextureUse::Normal => (if sample_bytes == 1 { 3 } else { 6 }, 6),
-            TextureUse::Mask(_) => (3, 1),
+            TextureUse::Normal => (if sample_bytes == 1 && channels > 1 { 3 } else { 6 }, 6),
+            // The shares, and on the first level the numbers as well
+            TextureUse::Mask(rule) => (if sample_bytes == 1 && rule.keeps_bytes() { 2 } else { 3 }, 1),
         };
         let mut bytes = 0;
         let [mut width, mut height] = size.map(|side| u64::from(side.max(1)));
