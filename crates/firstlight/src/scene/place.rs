@@ -186,10 +186,11 @@ pub(super) fn compile_shapes(
     let group_ids = desc.groups.iter().enumerate().rev().map(|(id, (name, _))| (name.as_str(), id)).collect();
     let rules = MaterialRules::new(compiled);
     let shapes = desc.groups.iter().flat_map(|(_, group)| &group.shapes).chain(&desc.shapes);
-    let instances = shapes.filter(|shape| matches!(shape, ShapeDesc::Instance(_)));
+    let may_matter = rules.has_maps() || rules.has_uv_sets();
+    let instances = shapes.filter(|shape| may_matter && matches!(shape, ShapeDesc::Instance(_)));
     let of_instances = instances.filter_map(|instance| materials.find(instance.common().material?));
     let (mut maps_groups, mut uv_sets_of_instances) = (false, UvSetUse::default());
-    for material in of_instances.filter(|_| rules.has_maps() || rules.has_uv_sets()) {
+    for material in of_instances {
         maps_groups |= rules.has_own_map(material);
         uv_sets_of_instances = uv_sets_of_instances.joined(&rules.uv_sets(material));
     }

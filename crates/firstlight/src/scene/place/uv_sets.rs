@@ -1,5 +1,7 @@
 //! The sets of texture coordinates that textures name, and those that shapes have.
 
+use std::collections::HashSet;
+
 use super::{Compiler, Form, GroupSpace, PlacedShape};
 use crate::context::CompileContext;
 use crate::describe::Family;
@@ -62,7 +64,12 @@ impl Compiler<'_, '_> {
     ) {
         let sets = source.data.uvs.len();
         let named = desc.material.as_ref().and_then(|name| self.materials.find(name));
-        for (i, material) in faces.iter().enumerate().filter(|(i, material)| !faces[..*i].contains(material)) {
+        let mut known = HashSet::new();
+        let lacks = |material: MaterialId| self.rules.uv_sets(material).beyond(sets.max(1)).is_some();
+        for (i, material) in faces.iter().enumerate().filter(|(_, material)| lacks(**material)) {
+            if !known.insert(material) {
+                continue;
+            }
             let (field, hint) = match &desc.file {
                 Some(_) => ("file".to_owned(), "sets are counted from 0: name one that the file has"),
                 None => (
