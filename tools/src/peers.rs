@@ -27,6 +27,9 @@ pub struct Options {
     /// Two smooth meshes under two area lights instead of config 11, at several tolerances and numbers of samples.
     #[arg(long, conflicts_with = "povray")]
     curve: bool,
+    /// With `--curve`: one model of rough metal, the other and the floor with textures.
+    #[arg(long, requires = "curve")]
+    textured: bool,
     /// Rounds: each runs every program once, one after the other.
     #[arg(long, default_value_t = 3)]
     rounds: usize,
@@ -90,7 +93,7 @@ pub fn run(options: &Options) -> Outcome {
         let rows: Vec<_> = ways.iter().map(row).collect();
         let versions = versions(options);
         let data = json!({
-            "scene": if options.curve { "soft meshes" } else { "config11" },
+            "scene": if options.curve { if options.textured { "textured meshes" } else { "soft meshes" } } else { "config11" },
             "size": options.size, "rows": rows, "versions": versions, "commit": commit(), "processor": processor(),
         });
         let text = serde_json::to_string_pretty(&data).map_err(|e| e.to_string())?;
@@ -152,7 +155,8 @@ fn curve(options: &Options, folder: &Path) -> Result<Vec<Way>, String> {
     };
     let (width, height) = (options.size.to_string(), (options.size * 9 / 16).to_string());
     let ours = options.program.clone().map_or_else(built, Ok)?.display().to_string();
-    let scene = root().join("tools/peers/soft_meshes.toml").display().to_string();
+    let scene = if options.textured { "tools/peers/textured_meshes.toml" } else { "tools/peers/soft_meshes.toml" };
+    let scene = root().join(scene).display().to_string();
     let models = root().display().to_string();
     let own = [
         &ours,
@@ -188,7 +192,9 @@ fn curve(options: &Options, folder: &Path) -> Result<Vec<Way>, String> {
             ("direct, 256 samples", "256", "1"),
             ("direct, 1024 samples", "1024", "1"),
         ] {
-            add("Mitsuba", name, passes == "20", &[&python, &script, &width, samples, passes]);
+            let mut command = vec![&python[..], &script, &width, samples, passes];
+            command.extend(options.textured.then_some("textured"));
+            add("Mitsuba", name, passes == "20", &command);
         }
     }
     Ok(ways)
@@ -322,7 +328,11 @@ fn page(options: &Options, ways: &[Way]) -> String {
     let peers = peers.iter().filter(|(_, path)| path.is_some());
     let peers: String = peers.map(|(name, _)| format!("--{} {name} ", name.to_lowercase())).collect();
     let name = options.name.as_ref().map(|name| format!(" --name {name}")).unwrap_or_default();
-    let curve = if options.curve { "--curve " } else { "" };
+    let curve = match (options.curve, options.textured) {
+        (true, true) => "--curve --textured ",
+        (true, false) => "--curve ",
+        _ => "",
+    };
     let _ = writeln!(page, "- command: `cargo xtask peers {curve}{peers}--rounds {rounds} --size {size}{name}`\n");
     let _ = writeln!(page, "| program | settings | seconds | rms error | worst error |\n|---|---|---|---|---|");
     for way in ways {
@@ -350,13 +360,24 @@ fn about_config11(Options { size, rounds, .. }: &Options) -> String {
     )
 }
 
-fn about_curve(Options { size, rounds, .. }: &Options, ways: &[Way]) -> String {
+fn about_curve(Options { size, rounds, textured, .. }: &Options, ways: &[Way]) -> String {
     let height = size * 9 / 16;
+    let (title, what) = match textured {
+        true => (
+            "Textures and metal: error against time",
+            "Two smooth models of 5,856 triangles, one of rough metal, the other and the floor with a picture of cobbles, \
+             under two area lights",
+        ),
+        false => (
+            "Soft shadows on meshes: error against time",
+            "Two smooth models of 5,856 triangles on a floor under two area lights",
+        ),
+    };
+    let more = if *textured { ", and one direction of the lobe" } else { "" };
     let mut text = format!(
-        "## Soft shadows on meshes: error against time\n\n\
-         Two smooth models of 5,856 triangles on a floor under two area lights, {size} x {height} pixels, 2 threads; 4 \
+        "## {title}\n\n{what}, {size} x {height} pixels, 2 threads; 4 \
          x 4 camera rays in each pixel of firstlight where nothing else is said, in Mitsuba as many as samples, with \
-         one point of one light for each. Seconds are of the processor, both threads together, medians of {rounds} \
+         one point of one light for each{more}. Seconds are of the processor, both threads together, medians of {rounds} \
          rounds, the programs in turns: the whole process of firstlight, the render alone of Mitsuba, without its \
          start and compilation. Ratios count more than seconds, as the machine may do other work. The error is that \
          against a converged picture of the same program, which was made once, in steps of an 8-bit picture as it is \
@@ -407,6 +428,7 @@ mod tests {
             python: Some("no-such-python".into()),
             povray: None,
             curve: true,
+            textured: false,
             rounds: 1,
             size: 64,
             program: Some("firstlight".into()),
