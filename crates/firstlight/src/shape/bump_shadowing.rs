@@ -28,7 +28,7 @@ impl BumpShadowing {
         let cos = smooth.dot(bent).max(0.0);
         let tan2 = (1.0 - cos * cos) / (cos * cos);
         // Also where the tangent is infinite
-        let alpha = (ALPHA2 * tan2).min(1.0).max(0.0).sqrt();
+        let alpha = (ALPHA2 * tan2).clamp(0.0, 1.0).sqrt();
         BumpShadowing { alpha: if alpha < LEAST_ALPHA { 0.0 } else { alpha } }
     }
 
