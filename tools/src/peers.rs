@@ -179,6 +179,8 @@ fn curve(options: &Options, folder: &Path) -> Result<Vec<Way>, String> {
         ("tolerance 4", "4", "4"),
         ("tolerance 16", "4", "16"),
         ("tolerance 4, 2 x 2 camera rays", "2", "4"),
+        ("tolerance 16, 2 x 2 camera rays", "2", "16"),
+        ("tolerance 16, one camera ray", "1", "16"),
     ] {
         let command = [&own[..], &["--aa", aa, "--tolerance", tolerance, "-o"]].concat();
         add("firstlight", name, tolerance == "0.25", &command);
