@@ -93,7 +93,11 @@ pub fn run(options: &Options) -> Outcome {
         let rows: Vec<_> = ways.iter().map(row).collect();
         let versions = versions(options);
         let data = json!({
-            "scene": if options.curve { if options.textured { "textured meshes" } else { "soft meshes" } } else { "config11" },
+            "scene": match (options.curve, options.textured) {
+                (true, true) => "textured meshes",
+                (true, false) => "soft meshes",
+                _ => "config11",
+            },
             "size": options.size, "rows": rows, "versions": versions, "commit": commit(), "processor": processor(),
         });
         let text = serde_json::to_string_pretty(&data).map_err(|e| e.to_string())?;
@@ -367,8 +371,8 @@ fn about_curve(Options { size, rounds, textured, .. }: &Options, ways: &[Way]) -
     let (title, what) = match textured {
         true => (
             "Textures and metal: error against time",
-            "Two smooth models of 5,856 triangles, one of rough metal, the other and the floor with a picture of cobbles, \
-             under two area lights",
+            "Two smooth models of 5,856 triangles, one of rough metal, the other and the floor with a picture of \
+             cobbles, under two area lights",
         ),
         false => (
             "Soft shadows on meshes: error against time",
@@ -377,12 +381,12 @@ fn about_curve(Options { size, rounds, textured, .. }: &Options, ways: &[Way]) -
     };
     let more = if *textured { ", and one direction of the lobe" } else { "" };
     let mut text = format!(
-        "## {title}\n\n{what}, {size} x {height} pixels, 2 threads; 4 \
-         x 4 camera rays in each pixel of firstlight where nothing else is said, in Mitsuba as many as samples, with \
-         one point of one light for each{more}. Seconds are of the processor, both threads together, medians of {rounds} \
-         rounds, the programs in turns: the whole process of firstlight, the render alone of Mitsuba, without its \
-         start and compilation. Ratios count more than seconds, as the machine may do other work. The error is that \
-         against a converged picture of the same program, which was made once, in steps of an 8-bit picture as it is \
+        "## {title}\n\n{what}, {size} x {height} pixels, 2 threads; 4 x 4 camera rays in each pixel of firstlight \
+         where nothing else is said, in Mitsuba as many as samples, with one point of one light for each{more}. \
+         Seconds are of the processor, both threads together, medians of {rounds} rounds, the programs in turns: the \
+         whole process of firstlight, the render alone of Mitsuba, without its start and compilation. Ratios count \
+         more than seconds, as the machine may do other work. The error is that against a converged picture of the \
+         same program, which was made once, in steps of an 8-bit picture as it is \
          displayed, where that picture is smooth: where 3 x 3 pixels span less than 6 steps."
     );
     if let Some([rms, _]) = ways.iter().find(|way| way.converged && way.program == "Mitsuba").and_then(|way| way.error)

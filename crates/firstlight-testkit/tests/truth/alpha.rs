@@ -411,6 +411,19 @@ fn light_passes_solids_that_a_mask_leaves_out() {
 }
 
 #[test]
+fn shadow_rays_through_edges_meet_each_place_once() {
+    // Through the middles of two edges of a tetrahedron that do not touch: two layers, of two triangles each
+    let text = format!(
+        "{CAMERA}{MATERIALS}[[light.point]]\nposition = [0, 4, 0]\n[[mesh]]\n\
+         positions = [[-1, 1, 0], [1, 1, 0], [0, 2, -1], [0, 2, 1]]\n\
+         triangles = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]\nmaterial = \"sheet\"\n"
+    );
+    let scene = scene(&text);
+    let fractions = scene.visible_fractions(LightId(0), 1, |_| (DVec3::ZERO, Some(Vec3::Y)));
+    assert_eq!(fractions, [0.25]);
+}
+
+#[test]
 fn points_see_a_part_of_a_light_through_a_sheet() {
     let text = format!(
         "{CAMERA}{MATERIALS}[[light.rectangle]]\ncenter = [0, 4, 0]\ne0 = [1, 0, 0]\ne1 = [0, 0, 1]\n\

@@ -177,8 +177,8 @@ pub(super) fn sides(cells: &[Cell]) -> [LaneNumbers; 4] {
 /// Values at the nodes: [moment][row][column]. Those of moments that a lobe does not have are left as they are.
 pub(crate) type NodeValues = [[[LaneNumbers; NODES]; NODES]; MOMENTS];
 
-/// Writes the moments' integrands at the nodes of up to sixteen cells, and returns the areas of the cells. To be called
-/// within `vectorize`.
+/// Writes the moments' integrands at the nodes of up to sixteen cells. Returns the factor of the quadrature sums: a
+/// quarter of each cell's dx dy, times the light's measure. To be called within `vectorize`.
 #[inline(always)]
 fn evaluate_nodes<S: Simd>(
     simd: S,

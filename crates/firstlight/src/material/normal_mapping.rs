@@ -14,7 +14,8 @@ use crate::texture::{Param, Params, Texture};
 words! {
     /// What is made of shading normals that face away from the viewer, or mirror the viewer below the surface.
     pub enum NormalFix {
-        /// They are raised until they do neither.
+        /// They are turned to the viewer, those of highlights until they mirror the viewer above the surface, and the
+        /// bumps of a map shadow each other.
         Raise = "raise",
         /// They stay as they are: pixels there may be black.
         None = "none",
@@ -79,7 +80,8 @@ impl NormalMapping {
     ///
     /// The variance is s^2 = (1 - |n|) / |n| of a mean normal of length |n|: Toksvig, "Mipmapping normal maps", Journal
     /// of Graphics Tools 10(3), 2005. Between the texels of a picture that is magnified a mean is shorter as well, but
-    /// no normals vary there: as much of the variance counts as the pixel covers of a texel.
+    /// no normals vary there: the variance is multiplied by min(w, 1)^2, with w the longer side of the footprint in
+    /// texels, and by the square of the map's scale.
     ///
     /// A bump map h has the normal n - dh/ds, the gradient over the surface: Mikkelsen, "Bump mapping unparametrized
     /// surfaces on the GPU", Journal of Graphics Tools 15(1), 2010.

@@ -4,7 +4,8 @@ use super::{Material, NormalMapping};
 use crate::ids::TextureId;
 use crate::shape::UV_SETS;
 
-/// The sets of texture coordinates that the textures of a material name. Without textures that name one the default.
+/// The sets of texture coordinates that the textures of a material name. If none names a set, `all`, `maps` and
+/// `named_by` are empty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct UvSetUse {
     /// The sets, as bits.

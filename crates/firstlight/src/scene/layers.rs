@@ -267,7 +267,7 @@ impl Geometry {
         let mut k = 1;
         while k < found.len() {
             let is_same = |before: &LayerHit| self.are_neighbours(&before.hit, &found[k].hit);
-            let is_near = |before: &&LayerHit| found[k].hit.t - before.hit.t <= found[k].hit.t * SAME_PLACE;
+            let is_near = |before: &&LayerHit| is_one_place(&before.hit, &found[k].hit);
             if found[..k].iter().rev().take_while(is_near).any(is_same) {
                 found.remove(k);
             } else {
@@ -276,19 +276,27 @@ impl Geometry {
         }
     }
 
-    /// Whether two hits of one ray are on an edge, or at a corner, that two triangles of one surface share.
+    /// Whether two hits of one ray are at one place on an edge, or at a corner, that two triangles of one surface
+    /// share: both are on edges, the triangles have a corner in common, and the distances are the same but for
+    /// rounding.
     pub(super) fn are_neighbours(&self, one: &Hit, other: &Hit) -> bool {
         let (At::Placed(index, PlacedSpot::Triangle(a)), At::Placed(same, PlacedSpot::Triangle(b))) =
             (one.at, other.at)
         else {
             return false;
         };
-        if index != same || one.surface != other.surface || !is_on_edge(a) || !is_on_edge(b) {
+        let is_apart = index != same || one.surface != other.surface || !is_one_place(one, other);
+        if is_apart || !is_on_edge(a) || !is_on_edge(b) {
             return false;
         }
         let PlacedTarget::Mesh(mesh) = self.placed[index as usize].target else { return false };
         share_corner(&self.meshes[mesh as usize], a.triangle, b.triangle)
     }
+}
+
+/// Whether two hits of one ray are equally far away, but for rounding.
+fn is_one_place(one: &Hit, other: &Hit) -> bool {
+    (other.t - one.t).abs() <= one.t.max(other.t) * SAME_PLACE
 }
 
 fn is_on_edge(point: TrianglePoint) -> bool {

@@ -11,9 +11,9 @@ use crate::shape::{BumpShadowing, NormalFrame, RayDifferential, SolidHit, Surfac
 /// surface: below it a highlight at grazing angles is brighter than what is around it.
 const LEAST_COS: f32 = 0.01;
 
-/// The variance of a pixel's filter, in pixels^2: a Gaussian of 1 / sqrt(2 pi).
+/// The variance of a pixel's filter, in pixels^2: a Gaussian of standard deviation 1 / sqrt(2 pi).
 const PIXEL_VARIANCE: f32 = 0.159_154_94;
-/// The largest variance of slopes by curvature: wider than that no highlight is, however small the thing.
+/// The largest variance of slopes that curvature adds.
 const MOST_CURVED: f32 = 0.09;
 
 impl Scene {
@@ -100,8 +100,8 @@ fn facing(ng: Vec3, wo: Vec3, ns: Vec3) -> Vec3 {
 
 /// The normal of a highlight that mirrors the viewer above the surface, from a shading normal that faces the viewer.
 ///
-/// The mirrored direction r is where r.ng is the smaller of 0.01 and 0.9 (ng.wo) at least: the normal is turned towards
-/// ng in the plane of both, as little as that takes. Source: the rule that Cycles has, "Fix for black areas with
+/// The mirrored direction r has r.ng >= min(0.01, 0.9 ng.wo): the normal is turned towards ng in the plane of both, as
+/// little as that takes. Source: the rule that Cycles has, "Fix for black areas with
 /// specular bump maps", `ensure_valid_specular_reflection`, Blender 2.80.
 fn mirroring(ng: Vec3, wo: Vec3, ns: Vec3) -> Vec3 {
     let height = ng.dot(wo);
@@ -124,8 +124,8 @@ fn mirroring(ng: Vec3, wo: Vec3, ns: Vec3) -> Vec3 {
 }
 
 impl Geometry {
-    /// What a normal map that is laid by a set of texture coordinates counts from at a hit of a shape whose front
-    /// normal there is `n`. `None` where u has no direction.
+    /// The tangent frame of a set of texture coordinates at a hit of a shape whose front normal there is `n`. `None`
+    /// where neither u nor v has a direction.
     pub fn normal_frame(&self, ray: &Ray, hit: &Hit, n: Vec3, set: Option<u8>) -> Option<NormalFrame> {
         match hit.at {
             At::World(point) => self.world.as_ref()?.mesh.normal_frame(None, point, set),

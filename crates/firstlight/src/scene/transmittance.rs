@@ -1,5 +1,6 @@
-//! How much light layers let through to a surface: the product over all of them of 1 - alpha, in ascending order of
-//! surface and primitive, so that no traversal decides its bits. Masks are read at their finest level: 0 or 1.
+//! How much light layers let through to a surface: the product over all of them of 1 - alpha. Factors are sorted by
+//! surface, primitive and distance: in another order a product rounds differently, and the order of a traversal would
+//! decide its bits. Textures are read at their finest level, where a mask is 0 or 1.
 
 use std::cell::RefCell;
 
@@ -13,8 +14,8 @@ use crate::ids::SurfaceId;
 use crate::math::{DRay, LANES, Ray, ShadowRay};
 use crate::shape::{PacketHits, RayDifferential, ShadowTerminator, TrianglePoint, bits};
 
-/// What is left of light by the layers on up to sixteen rays.
-struct Veils<'a> {
+/// The factors of the layers on up to sixteen rays.
+struct LayerFactors<'a> {
     scene: &'a Scene,
     /// The factors that are neither 0 nor 1.
     factors: Vec<LayerFactor>,
@@ -43,11 +44,11 @@ impl Scene {
 
     #[inline(never)]
     fn product_of_layers(&self, ray: &ShadowRay) -> f32 {
-        let mut veils = Veils { scene: self, factors: Vec::new() };
-        if self.geometry.pass_layers(self.level, &LaneRay { ray, lane: 0 }, &mut veils) {
+        let mut factors = LayerFactors { scene: self, factors: Vec::new() };
+        if self.geometry.stopped_by_layers(self.level, &LaneRay { ray, lane: 0 }, &mut factors) {
             0.0
         } else {
-            veils.product(0)
+            factors.product(0)
         }
     }
 }
@@ -58,36 +59,36 @@ impl Scene {
     #[inline(never)]
     pub(crate) fn left_by_layers16(&self, shadows: &ShadowRays, active: u16) -> [f32; LANES] {
         let geometry = &*self.geometry;
-        let mut veils = Veils { scene: self, factors: Vec::new() };
+        let mut factors = LayerFactors { scene: self, factors: Vec::new() };
         let stopped = dispatch_sixteen!(
             self.level,
-            simd => geometry.pass_layers16(simd, shadows, active, &RefCell::new(&mut veils)),
+            simd => geometry.stopped_by_layers16(simd, shadows, active, &RefCell::new(&mut factors)),
             else {
                 one_by_one(active, |lane| {
-                    geometry.pass_layers(self.level, &LaneRay { ray: &shadows.ray(lane), lane }, &mut veils)
+                    geometry.stopped_by_layers(self.level, &LaneRay { ray: &shadows.ray(lane), lane }, &mut factors)
                 })
             }
         );
         let mut left = [0.0; LANES];
         for lane in bits(u64::from(active & !stopped)) {
-            left[lane] = veils.product(lane);
+            left[lane] = factors.product(lane);
         }
         left
     }
 }
 
-/// A ray, and its number among those of its veils.
+/// A ray, and its lane.
 struct LaneRay<'a> {
     ray: &'a ShadowRay,
     lane: usize,
 }
 
-/// Veils for filters of trees, which cannot change what they hold.
-type LaneVeils<'a, 'b> = RefCell<&'a mut Veils<'b>>;
+/// The factors, shared by the callbacks of traversals, which are `Fn`.
+type SharedFactors<'a, 'b> = RefCell<&'a mut LayerFactors<'b>>;
 
-impl Veils<'_> {
-    /// Adds a layer, unless the ray starts on it: whether it stops all light. Most layers that are not opaque are holes,
-    /// for which `is_start` is not computed.
+impl LayerFactors<'_> {
+    /// Adds the hit of a layer, unless the ray starts on it. Returns whether it stops all light. Hits with alpha 0,
+    /// most of those of masks, skip `is_start`.
     #[inline]
     fn add(&mut self, lane: usize, hit: Hit, line: impl Fn() -> Ray, is_start: impl FnOnce() -> bool) -> bool {
         let scene = self.scene;
@@ -140,56 +141,61 @@ impl Veils<'_> {
 }
 
 impl Geometry {
-    /// Adds the layers on a shadow ray, until one stops all light: whether one does.
-    fn pass_layers(&self, level: Level, ray: &LaneRay, veils: &mut Veils) -> bool {
-        dispatch_eight!(level, simd => self.pass_layers_with(simd, ray, veils))
+    /// Adds the layers on a shadow ray until one stops all light. Returns whether one does.
+    fn stopped_by_layers(&self, level: Level, ray: &LaneRay, factors: &mut LayerFactors) -> bool {
+        dispatch_eight!(level, simd => self.stopped_by_layers_with(simd, ray, factors))
     }
 
     #[inline(always)]
-    fn pass_layers_with<S: Simd>(&self, simd: S, of: &LaneRay, veils: &mut Veils) -> bool {
+    fn stopped_by_layers_with<S: Simd>(&self, simd: S, of: &LaneRay, factors: &mut LayerFactors) -> bool {
         let Some(layers) = &self.layers else { return false };
         let ray = of.ray;
-        if layers.unbounded.iter().any(|thing| self.pass_placed_layer(simd, *thing, of, veils)) {
+        if layers.unbounded.iter().any(|thing| self.stopped_by_placed(simd, *thing, of, factors)) {
             return true;
         }
         layers.upper.any(simd, &TraceRay::new(ray.start, ray.l), ray.t_max, |item| match layers.items[item as usize] {
-            item @ (UpperItem::Sphere(_) | UpperItem::Parallelogram(_)) => self.pass_listed_layer(item, of, veils),
-            UpperItem::Placed(i) => self.pass_placed_layer(simd, i, of, veils),
+            item @ (UpperItem::Sphere(_) | UpperItem::Parallelogram(_)) => self.stopped_by_listed(item, of, factors),
+            UpperItem::Placed(i) => self.stopped_by_placed(simd, i, of, factors),
         })
     }
 
-    /// The same for the rays in `active`: those that a layer stops.
+    /// The same for the rays in `active`. Returns those that a layer stops.
     #[inline(always)]
-    fn pass_layers16<S: Simd>(&self, simd: S, shadows: &ShadowRays, active: u16, veils: &LaneVeils) -> u16 {
+    fn stopped_by_layers16<S: Simd>(&self, simd: S, shadows: &ShadowRays, active: u16, factors: &SharedFactors) -> u16 {
         let Some(layers) = &self.layers else { return 0 };
         let mut done = 0;
         for thing in &layers.unbounded {
-            done |= self.pass_placed_layer16(simd, *thing, shadows, active & !done, veils);
+            done |= self.stopped_by_placed16(simd, *thing, shadows, active & !done, factors);
         }
         let whole = [shadows.from[0].t_max; LANES];
         done | layers.upper.any16(simd, &shadows.rays, &whole, active & !done, |item, asking| {
             match layers.items[item as usize] {
-                UpperItem::Placed(i) => self.pass_placed_layer16(simd, i, shadows, asking, veils),
+                UpperItem::Placed(i) => self.stopped_by_placed16(simd, i, shadows, asking, factors),
                 item => one_by_one(asking, |lane| {
-                    self.pass_listed_layer(item, &LaneRay { ray: &shadows.ray(lane), lane }, &mut veils.borrow_mut())
+                    self.stopped_by_listed(item, &LaneRay { ray: &shadows.ray(lane), lane }, &mut factors.borrow_mut())
                 }),
             }
         })
     }
 
     #[inline(never)]
-    fn pass_placed_layer16<S: Simd>(
+    fn stopped_by_placed16<S: Simd>(
         &self,
         simd: S,
         index: u32,
         shadows: &ShadowRays,
         active: u16,
-        veils: &LaneVeils,
+        factors: &SharedFactors,
     ) -> u16 {
         let thing = &self.placed[index as usize];
         let PlacedTarget::Mesh(_) = thing.target else {
             return one_by_one(active, |lane| {
-                self.pass_placed_layer(simd, index, &LaneRay { ray: &shadows.ray(lane), lane }, &mut veils.borrow_mut())
+                self.stopped_by_placed(
+                    simd,
+                    index,
+                    &LaneRay { ray: &shadows.ray(lane), lane },
+                    &mut factors.borrow_mut(),
+                )
             });
         };
         let light = shadows.from[0].to.light;
@@ -203,14 +209,14 @@ impl Geometry {
             if !mesh.casts(triangle) {
                 return 0;
             }
-            let veils = &mut **veils.borrow_mut();
+            let factors = &mut **factors.borrow_mut();
             let surface = SurfaceId(thing.surface.0 + mesh.mesh.part(triangle).surface);
             let is_stopped = |lane: &usize| {
                 let point = TrianglePoint { triangle, u: hits.u[*lane], v: hits.v[*lane] };
                 let at = At::Placed(index, PlacedSpot::Triangle(point));
                 let line = || shadows.ray(*lane).line();
                 let is_start = || mesh.is_start(shadows.origin(*lane), rays.o(*lane), triangle);
-                veils.add(*lane, Hit { t: f64::from(hits.t[*lane]), surface, at }, line, is_start)
+                factors.add(*lane, Hit { t: f64::from(hits.t[*lane]), surface, at }, line, is_start)
             };
             bits(hits.lanes).filter(is_stopped).fold(0, |stopped, lane| stopped | 1 << lane)
         };
@@ -220,9 +226,9 @@ impl Geometry {
         )
     }
 
-    /// A sphere or a parallelogram of [`pass_layers`](Self::pass_layers).
+    /// A sphere or a parallelogram of [`stopped_by_layers`](Self::stopped_by_layers).
     #[inline(never)]
-    fn pass_listed_layer(&self, item: UpperItem, &LaneRay { ray, lane }: &LaneRay, veils: &mut Veils) -> bool {
+    fn stopped_by_listed(&self, item: UpperItem, &LaneRay { ray, lane }: &LaneRay, factors: &mut LayerFactors) -> bool {
         let line = || ray.line();
         match item {
             UpperItem::Sphere(i) => {
@@ -230,27 +236,27 @@ impl Geometry {
                 let exact = DRay { o: ray.start.as_dvec3(), d: ray.l.as_dvec3() };
                 let within = [0.0, f64::from(ray.end())];
                 self.casts(owned.surface, ray.to.light)
-                    && owned
-                        .shape
-                        .crossings(&exact, within, false)
-                        .into_iter()
-                        .flatten()
-                        .any(|t| veils.add(lane, Hit { t, surface: owned.surface, at: At::Sphere(i) }, line, || false))
+                    && owned.shape.crossings(&exact, within, false).into_iter().flatten().any(|t| {
+                        factors.add(lane, Hit { t, surface: owned.surface, at: At::Sphere(i) }, line, || false)
+                    })
             }
             UpperItem::Parallelogram(i) => {
                 let owned = &self.parallelograms[i as usize];
-                let crossing = || owned.shape.crossing(ray.start.as_dvec3(), ray.l.as_dvec3());
+                let hit = || {
+                    let t = owned.shape.crossing(ray.start.as_dvec3(), ray.l.as_dvec3());
+                    Hit { t, surface: owned.surface, at: At::Parallelogram(i) }
+                };
                 self.casts(owned.surface, ray.to.light)
                     // As with opaque parallelograms, a coplanar one does not block the ray
                     && owned.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite())
-                    && veils.add(lane, Hit { t: crossing(), surface: owned.surface, at: At::Parallelogram(i) }, line, || false)
+                    && factors.add(lane, hit(), line, || false)
             }
             UpperItem::Placed(_) => false,
         }
     }
 
     #[inline(never)]
-    fn pass_placed_layer<S: Simd>(&self, simd: S, index: u32, of: &LaneRay, veils: &mut Veils) -> bool {
+    fn stopped_by_placed<S: Simd>(&self, simd: S, index: u32, of: &LaneRay, factors: &mut LayerFactors) -> bool {
         let (thing, &LaneRay { ray, lane }) = (&self.placed[index as usize], of);
         let line = || ray.line();
         if !self.stops(thing.shadow, ray.to.light) {
@@ -273,7 +279,7 @@ impl Geometry {
                             let point = TrianglePoint { triangle: hit.triangle, u: hit.u, v: hit.v };
                             let at = At::Placed(index, PlacedSpot::Triangle(point));
                             let is_start = || mesh.is_start(ray, o, hit.triangle);
-                            veils.add(lane, Hit { t: f64::from(hit.t), surface, at }, line, is_start)
+                            factors.add(lane, Hit { t: f64::from(hit.t), surface, at }, line, is_start)
                         })
                     },
                 )
@@ -281,14 +287,14 @@ impl Geometry {
             PlacedTarget::Points(points) => {
                 self.point_sets[points as usize].each(simd, &own, end, false, |t, point| {
                     let at = At::Placed(index, PlacedSpot::Point(point));
-                    veils.add(lane, Hit { t, surface: thing.surface, at }, line, || false)
+                    factors.add(lane, Hit { t, surface: thing.surface, at }, line, || false)
                 })
             }
             PlacedTarget::Solid(solid) => {
                 let mut after = 0.0;
                 while let Some(hit) = self.solids[solid as usize].intersect(&own, after, end.into(), false) {
                     let at = At::Placed(index, PlacedSpot::Part(hit.part));
-                    if veils.add(lane, Hit { t: hit.t, surface: thing.surface, at }, line, || false) {
+                    if factors.add(lane, Hit { t: hit.t, surface: thing.surface, at }, line, || false) {
                         return true;
                     }
                     after = hit.t;

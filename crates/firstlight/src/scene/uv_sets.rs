@@ -1,4 +1,4 @@
-//! Where a hit lies on textures that are laid by a set of texture coordinates of their own.
+//! Texture coordinates of a hit in the sets that textures name.
 
 use super::geometry::{At, Geometry, Hit, Placed, PlacedSpot, PlacedTarget};
 use crate::math::Ray;
@@ -23,7 +23,7 @@ impl Geometry {
                 (Some(&*self.meshes[mesh as usize]), Some(placement), point)
             }
             _ => {
-                // All else has set 0 alone, which is its own
+                // All else has set 0 alone
                 si.uv_sets[0] = TexturePoint { uv: si.uv, dx: si.footprint.dx, dy: si.footprint.dy };
                 return;
             }

@@ -7,10 +7,11 @@ use crate::math::Vec3;
 
 /// How much of the light on a surface its bumps let through.
 ///
-/// G(wi) = 2 / (1 + sqrt(1 + alpha^2 tan^2 a)), a the angle of wi off the normal of the smooth surface: the masking of
-/// one direction by microfacets as wide as the bent normal is off the smooth one, alpha^2 = tan^2 d / 8 and at most 1.
-/// Source: Conty Estevez, Lecocq, Stein, "A microfacet-based shadowing function to solve the bump terminator problem", Ray
-/// Tracing Gems, chapter 12, 2019.
+/// G(wi) = 2 / (1 + sqrt(1 + alpha^2 tan^2 a)) is Smith's masking G1 of GGX. a is the angle between wi and the normal
+/// of the horizon: the smooth normal on lifted points, else the geometric one. alpha^2 = tan^2 d / 8, at most 1, with d
+/// the angle between the smooth normal and the bent one.
+/// Source: Conty Estevez, Lecocq, Stein, "A microfacet-based shadowing function to solve the bump terminator problem",
+/// Ray Tracing Gems, chapter 12, 2019.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct BumpShadowing {
     /// alpha; 0 where nothing is shadowed.
@@ -32,7 +33,7 @@ impl BumpShadowing {
         BumpShadowing { alpha: if alpha < LEAST_ALPHA { 0.0 } else { alpha } }
     }
 
-    /// G of a direction whose cosine to the smooth normal is `cos`; 1 where nothing is shadowed.
+    /// G of a direction whose cosine to the normal of the horizon is `cos`; 1 where nothing is shadowed.
     #[inline(always)]
     pub fn factor(self, cos: f32) -> f32 {
         if self.alpha == 0.0 {
@@ -64,8 +65,8 @@ impl BumpShadowing {
     }
 }
 
-/// The least cosine over alpha for which the factor is computed. No light comes from below 0, but polynomials that are
-/// fitted across the horizon need values there, on which the factor goes on smoothly.
+/// The least cosine over alpha for which the factor is computed; at 0 it is 0, and negative below. No light comes from
+/// there, but the polynomials that are fitted across the horizon need a smooth continuation.
 const LOWEST: f32 = -0.5;
 
 #[cfg(test)]

@@ -115,9 +115,10 @@ pub struct SurfaceInteraction {
     pub ng: Vec3,
     /// Shading normal: unit, turned together with `ng`.
     pub ns: Vec3,
-    /// That of the highlight, which a map may bend less.
+    /// Shading normal of the highlight: `ns`, turned so that it mirrors the viewer above the surface where a map bends
+    /// it.
     pub(crate) lobe_ns: Vec3,
-    /// By the bumps that a map stands for.
+    /// Bump shadowing of `ns` and `lobe_ns`.
     pub(crate) bump_shadowing: BumpShadowing,
     /// Where light is gathered: `p`, or where it is lifted to from a facet that stands for something round; see
     /// [`ShadowTerminator`].
@@ -139,7 +140,7 @@ pub struct SurfaceInteraction {
     /// How much larger the variance of the slopes of microfacets is than the material says: that of the normals within
     /// the pixel.
     pub(crate) slope_variance: f32,
-    /// The same of a clear coat, which the maps of the material do not bend.
+    /// Shading normal of the clear coat, bent by its own map, its variance of slopes and its bump shadowing.
     pub(crate) coat_ns: Vec3,
     pub(crate) coat_slope_variance: f32,
     pub(crate) coat_bump_shadowing: BumpShadowing,

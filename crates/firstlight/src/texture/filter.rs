@@ -20,7 +20,7 @@ const MAX_RATIO: f64 = 16.0;
 /// Footprints with a radius below this, in texels, are magnified.
 const MAGNIFIED: f64 = 0.5;
 
-/// The smaller radius of an ellipse on its level, in texels of that level, is at least this. The boxes of the level
+/// From level 1 on the smaller radius of an ellipse, in texels of its level, is at least this. The boxes of the level
 /// blur as well: with 1 the value is 1.4 display steps rms from the same kernel over the picture itself on a
 /// photograph, with 1.25 0.8 steps, for 1.6 times the texels.
 const SMALLEST_RADIUS: f64 = 1.125;
@@ -37,7 +37,8 @@ static KERNEL: std::sync::LazyLock<[f32; WEIGHTS]> = std::sync::LazyLock::new(||
     })
 });
 
-/// The most texels that half an ellipse reaches along an axis; on the level of its smaller radius it is at most 2 x 16.
+/// The most texels that half an ellipse reaches along an axis. On the level that the smaller radius chooses the larger
+/// one is below 2.25 x 16 = 36.
 /// More is met only where one side of a picture is one texel and the other many.
 const MAX_REACH: f64 = 64.0;
 
@@ -112,8 +113,8 @@ impl Pyramid {
         if part == 0.0 { fine } else { mix(fine, self.bilinear(level + 1, place.at, beyond), part) }
     }
 
-    /// The level whose texels are as long as `radius`, in texels of the picture, or the longest below, and the part of
-    /// the next: even steps of the radius from one to the other.
+    /// The level floor(log2(`radius`)), or the last, and the weight of the next, linear in the radius, which is in
+    /// texels of the picture.
     fn level(&self, radius: f64) -> (usize, f32) {
         let last = self.levels.len() - 1;
         let (mut level, mut size) = (0, 1.0);

@@ -40,7 +40,7 @@ impl Compiler<'_, '_> {
         what: &str,
         hint: &str,
     ) {
-        // Set 0 is there always: without texture coordinates it is that of the corners
+        // A mesh without texture coordinates has (0, 0), (1, 0), (0, 1) at the corners of each triangle as set 0
         let Some((set, texture)) = self.rules.uv_sets(material).beyond(sets.max(1)) else { return };
         let (material, texture) = (self.materials.name(material), &self.desc.textures[texture as usize].0);
         let message = format!("the texture {texture:?} of the material {material:?} has uv_set {set}: {what}");
@@ -115,7 +115,8 @@ impl Compiler<'_, '_> {
         format!("group.{name}.{place} {}", in_words(is_mesh, fewest.sets))
     }
 
-    /// The sets of a mesh that textures on it name; in a group also those of materials that instances put on it.
+    /// The sets of a mesh that textures on it name; in a group also those of the materials of all instances of the
+    /// scene.
     pub(super) fn named_uv_sets(&self, source: &MeshSource, faces: &[MaterialId], is_in_group: bool) -> NamedSets {
         let of_instances = is_in_group.then_some(self.uv_sets_of_instances);
         let named = faces.iter().map(|material| self.rules.uv_sets(*material)).chain(of_instances);
@@ -128,8 +129,8 @@ impl Compiler<'_, '_> {
     }
 }
 
-/// The first shape of a group, and of the groups in it, that has the fewest sets; `None` without shapes. `known` are
-/// those that were found.
+/// The first shape of a group, and of the groups in it, that has the fewest sets; `None` without shapes. `known`
+/// caches the result of each group.
 fn fewest_uv_sets(
     groups: &[GroupSpace],
     group: usize,
@@ -193,7 +194,7 @@ mod tests {
         let of = |more: &str| kept(&format!("[[{TRIANGLE}{more}"));
         assert_eq!(of(""), [(vec![], false)]);
         assert_eq!(of("material = \"plain\""), [(vec![], false)]);
-        // Nothing is made of it
+        // Opaque: its alpha is not used
         assert_eq!(of("material = \"hidden\""), [(vec![], false)]);
         assert_eq!(of("material = \"second\""), [(vec![(2, false)], false)]);
         assert_eq!(of("material = \"thin\""), [(vec![(2, false)], false)]);
