@@ -226,7 +226,7 @@ fn two_textures_of_a_material_may_have_two_sets() {
 fn shapes_of_other_kinds_have_set_0() {
     let of = |set: &str| {
         let text = format!(
-            "[render]\nwidth = 40\nheight = 32\n[camera]\nposition = [0, 2, 7]\nlook_at = [0, 0.5, 0]\n\
+            "[render]\nwidth = 20\nheight = 16\n[camera]\nposition = [0, 2, 7]\nlook_at = [0, 0.5, 0]\n\
              [[light.rectangle]]\ncenter = [1, 5, 3]\ne0 = [1, 0, 0]\ne1 = [0, 0, 1]\nstrength = 40\n\
              [texture.checkerboard.color]\ncounts = [5, 3]\n{set}\n[texture.image.wave]\nfile = \"wave.png\"\n{set}\n\
              [texture.image.height]\nfile = \"height.png\"\n{set}\n\
