@@ -364,7 +364,7 @@ impl SharedPicture<'_> {
 
 /// The set of texture coordinates that a texture names; one that is too large is a fault elsewhere.
 fn named_set(desc: &TextureDesc) -> Option<u8> {
-    desc.uv_set().map(|set| set.min(UV_SETS as u32 - 1) as u8)
+    desc.uv_set().filter(|set| *set < UV_SETS as u32).map(|set| set as u8)
 }
 
 const STANDS_IN: &str = "magenta and black stand in for it, unless compiled strictly";
