@@ -132,8 +132,8 @@ impl Geometry {
 
     /// Finds the meshes that are placed where camera rays inside of `planes` may meet them, if all that is placed there
     /// is a few meshes that let no ray pass: then each can be asked for many rays at once, see
-    /// [`meet_placed_tile`](Self::meet_placed_tile). What has no end is not among them. Hits with them are told apart
-    /// by their surfaces: two with the same are not a few.
+    /// [`meet_placed_tile`](Self::meet_placed_tile). Planes are not among them. A tile finds the mesh of a hit by its
+    /// surface: where two of the meshes have the same surface, the result is `false`.
     pub fn few_meshes(&self, level: Level, planes: &Planes, found: &mut Vec<u32>) -> bool {
         found.clear();
         if self.items.is_empty() {
