@@ -166,13 +166,74 @@ pub struct ReadingArgs {
     /// 2048]
     #[arg(long = "texture-memory", value_name = "MIB")]
     pub texture_memory: Option<u32>,
-    /// Makes the normals of a model smooth where its faces meet at less than DEGREES, 0 to 180 [default: its own
-    /// normals; flat if it has none]
-    #[arg(long, value_name = "DEGREES", value_parser = angle, help_heading = "Models (.ply, .stl, .obj)")]
-    pub smooth: Option<f64>,
-    /// The axis of a model that points upwards [default: y]
-    #[arg(long, value_name = "AXIS", help_heading = "Models (.ply, .stl, .obj)")]
+    #[command(flatten)]
+    pub model: ModelArgs,
+}
+
+/// How a model by itself is shown.
+#[derive(Args, Debug, Default)]
+#[command(next_help_heading = "Models (.glb, .gltf, .obj, .ply, .stl)")]
+pub struct ModelArgs {
+    /// What a model is lit by [default: soft]
+    #[arg(long, value_name = "STUDIO")]
+    pub studio: Option<StudioName>,
+    /// Whether a model stands on a ground that takes its shadow [default: on in the studios soft and clay]
+    #[arg(long, value_name = "ON")]
+    pub ground: Option<Switch>,
+    /// Which lights shine on a model: those of the studio, or those of the file, which is --studio none [default:
+    /// studio]
+    #[arg(long, value_name = "WHICH", conflicts_with = "studio")]
+    pub lights: Option<LightSource>,
+    /// The axis of a model that points upwards [default: y; z for .stl]
+    #[arg(long, value_name = "AXIS")]
     pub up: Option<Axis>,
+    /// Makes the normals of a model smooth where its faces meet at less than DEGREES, 0 to 180; not of glTF [default:
+    /// its own normals; 30 if it has none]
+    #[arg(long, value_name = "DEGREES", value_parser = angle)]
+    pub smooth: Option<f64>,
+    /// The variant of a glTF model, by its name [default: none]
+    #[arg(long, value_name = "NAME")]
+    pub variant: Option<String>,
+    /// The animation of a glTF model, by its name or its number from 0 on; it plays with --time and --frames [default:
+    /// the first one with --time or --frames, else the model is at rest]
+    #[arg(long, value_name = "NAME")]
+    pub animation: Option<String>,
+    /// The scene of a glTF model, by its number from 0 on [default: the one that the file shows]
+    #[arg(long = "gltf-scene", value_name = "NUMBER")]
+    pub scene: Option<u32>,
+}
+
+/// `--studio`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum StudioName {
+    /// three area lights, and a ground that takes their shadow
+    Soft,
+    /// two directional lights, of which one casts shadows: the quickest
+    Hard,
+    /// no light: every material shows its colour
+    Flat,
+    /// as soft, with every material a light warm gray
+    Clay,
+    /// the lights of the file, and nothing else
+    None,
+}
+
+/// Something that is or is not there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Switch {
+    /// it is there
+    On,
+    /// it is not
+    Off,
+}
+
+/// `--lights`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum LightSource {
+    /// the lights of the studio
+    Studio,
+    /// the lights of the file
+    File,
 }
 
 /// `--aa-mode`

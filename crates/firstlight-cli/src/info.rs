@@ -26,7 +26,7 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
         return picture::answer_picture(file, args.json);
     }
     let input = input::read(&args.scene.scene, &args.scene.reading)?;
-    if input.is_model {
+    if input.studio.is_some() && !input.is_gltf() {
         return answer_model(&input, args);
     }
     let compiled = input.compile(args.time.unwrap_or(0.0), false)?;
@@ -42,13 +42,13 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
 /// # Errors
 /// One is.
 fn refuse_options_of_scenes(args: &InfoArgs) -> Result<(), Failure> {
-    let ReadingArgs { strict, allow_dir, texture_memory, smooth, up } = &args.scene.reading;
+    let ReadingArgs { strict, allow_dir, texture_memory, model } = &args.scene.reading;
     let said = [
         ("--strict", *strict),
         ("--allow-dir", !allow_dir.is_empty()),
         ("--texture-memory", texture_memory.is_some()),
-        ("--smooth", smooth.is_some()),
-        ("--up", up.is_some()),
+        ("--smooth", model.smooth.is_some()),
+        ("--up", model.up.is_some()),
         ("--time", args.time.is_some()),
     ];
     match said.into_iter().find(|(_, said)| *said) {

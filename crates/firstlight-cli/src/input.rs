@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use firstlight::{
-    AssetError, Assets, CompileOptions, Compiled, FolderAssets, Framing, MeshFormat, ModelSettings, NoAssets, Parsed,
-    SceneDesc, UpAxis, builtin_scenes, is_point_set,
+    AssetError, Assets, CompileOptions, Compiled, FolderAssets, Framing, MeshFormat, NoAssets, Parsed, SceneDesc,
+    Studio, StudioSettings, UpAxis, builtin_scenes, is_gltf,
 };
 
-use crate::args::{Axis, ReadingArgs};
+use crate::args::{Axis, LightSource, ModelArgs, ReadingArgs, StudioName, Switch};
 use crate::output::Names;
 use crate::progress::loading;
 use crate::report::{Failure, say, shown};
@@ -31,8 +31,8 @@ pub struct Input {
     pub name: String,
     /// The description, and the faults of its text.
     pub parsed: Parsed,
-    /// Whether it is a model by itself, for which a camera and a light are found.
-    pub is_model: bool,
+    /// How it is shown, if it is a model by itself.
+    pub studio: Option<StudioSettings>,
     /// The scene's or model's own file, as it was named; standard input may be one too.
     own: Option<PathBuf>,
     /// The folder that the names of its files start at; a built-in scene has none.
@@ -137,10 +137,21 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
 /// # Errors
 /// `scene` is none.
 fn refuse_options_of_models(scene: &Path, reading: &ReadingArgs) -> Result<(), Failure> {
-    for (option, said) in [("--smooth", reading.smooth.is_some()), ("--up", reading.up.is_some())] {
+    let model = &reading.model;
+    let options = [
+        ("--studio", model.studio.is_some()),
+        ("--ground", model.ground.is_some()),
+        ("--lights", model.lights.is_some()),
+        ("--up", model.up.is_some()),
+        ("--smooth", model.smooth.is_some()),
+        ("--variant", model.variant.is_some()),
+        ("--animation", model.animation.is_some()),
+        ("--gltf-scene", model.scene.is_some()),
+    ];
+    for (option, said) in options {
         if said && !is_model(scene) {
-            let scene = shown(scene);
-            return Err(Failure::Usage(format!("{option} is for models, and {scene} is none (.ply, .stl, .obj)")));
+            let (scene, endings) = (shown(scene), MODEL_ENDINGS.map(|ending| format!(".{ending}")).join(", "));
+            return Err(Failure::Usage(format!("{option} is for models, and {scene} is none ({endings})")));
         }
     }
     Ok(())
@@ -161,7 +172,7 @@ fn read_text(
     Ok(Input {
         name,
         parsed,
-        is_model: false,
+        studio: None,
         own,
         folder,
         framing,
@@ -177,15 +188,18 @@ fn folder_assets(folder: &Path, reading: &ReadingArgs) -> Result<FolderAssets, F
         .map_err(|(path, e)| Failure::Work(format!("--allow-dir: {}: {e}", shown(&path))))
 }
 
+/// The endings of models.
+const MODEL_ENDINGS: [&str; 5] = ["glb", "gltf", "obj", "ply", "stl"];
+
 /// Whether `scene` names a model, by its ending.
 fn is_model(scene: &Path) -> bool {
     let ending = scene.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-    matches!(ending.as_deref(), Some("ply" | "stl" | "obj"))
+    ending.is_some_and(|ending| MODEL_ENDINGS.contains(&ending.as_str()))
 }
 
 /// Whether these are the first bytes of a mesh file; of a binary STL file, all of its bytes.
 fn is_mesh(bytes: &[u8]) -> bool {
-    MeshFormat::detect("", bytes).is_some()
+    MeshFormat::detect("", bytes).is_some() || is_gltf(bytes)
 }
 
 /// The length of a binary STL file that begins so, by its count of facets.
@@ -209,15 +223,14 @@ fn read_model(path: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
         let bytes = read_stream(file).map_err(work)?;
         return Ok(piped_model(&path.display().to_string(), Some(path.to_path_buf()), bytes, reading));
     }
-    let head = read_head(file).map_err(work)?;
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let file = PathBuf::from(path.file_name().unwrap_or_default());
     let (called, name) = (file.to_string_lossy().into_owned(), path.display().to_string());
     let assets = Remembered::new(Some(folder_assets(&folder, reading)?));
     Ok(Input {
-        parsed: Parsed::of_model(&name, &called, &model_settings(&head, reading)),
+        parsed: Parsed::of_model(&name, &called, &model_settings(&reading.model)),
         name,
-        is_model: true,
+        studio: Some(model_settings(&reading.model)),
         folder: Some(folder),
         framing: Framing::default(),
         own: Some(path.to_path_buf()),
@@ -231,14 +244,14 @@ fn read_model(path: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
 fn piped_model(name: &str, own: Option<PathBuf>, bytes: Vec<u8>, reading: &ReadingArgs) -> Input {
     let file = PathBuf::from(Path::new(name).file_name().unwrap_or_default());
     let called = file.to_string_lossy().into_owned();
-    let parsed = Parsed::of_model(name, &called, &model_settings(&bytes, reading));
+    let parsed = Parsed::of_model(name, &called, &model_settings(&reading.model));
     // There is nothing to read it from again
     let files = Mutex::new([(called.clone(), Ok(bytes))].into());
     let assets = Remembered { model: Some((called, file)), files, again: true, ..Remembered::new(None) };
     Input {
         name: name.to_owned(),
         parsed,
-        is_model: true,
+        studio: Some(model_settings(&reading.model)),
         folder: None,
         framing: Framing::default(),
         own,
@@ -248,12 +261,24 @@ fn piped_model(name: &str, own: Option<PathBuf>, bytes: Vec<u8>, reading: &Readi
     }
 }
 
-/// How a model that begins with `head` is shown.
-fn model_settings(head: &[u8], reading: &ReadingArgs) -> ModelSettings {
-    ModelSettings {
-        smooth_deg: reading.smooth,
-        up: if reading.up == Some(Axis::Z) { UpAxis::Z } else { UpAxis::Y },
-        points: is_point_set(head),
+/// How a model is shown.
+fn model_settings(model: &ModelArgs) -> StudioSettings {
+    let studio = match (model.studio, model.lights) {
+        (_, Some(LightSource::File)) | (Some(StudioName::None), _) => Studio::None,
+        (None | Some(StudioName::Soft), _) => Studio::Soft,
+        (Some(StudioName::Hard), _) => Studio::Hard,
+        (Some(StudioName::Flat), _) => Studio::Flat,
+        (Some(StudioName::Clay), _) => Studio::Clay,
+    };
+    StudioSettings {
+        studio,
+        ground: model.ground.map(|ground| ground == Switch::On),
+        up: model.up.map(|up| if up == Axis::Z { UpAxis::Z } else { UpAxis::Y }),
+        smooth_deg: model.smooth,
+        variant: model.variant.clone(),
+        scene: model.scene,
+        animation: model.animation.clone(),
+        ..StudioSettings::default()
     }
 }
 
@@ -288,12 +313,37 @@ pub fn course_output(scene: &Path) -> Option<String> {
 impl Input {
     /// Says that a camera was found, where a scene's text has none; a model never has one.
     pub fn tell_added(&self, compiled: &Compiled) {
-        if compiled.added.camera.is_some() && !self.is_model {
+        if compiled.added.camera.is_some() && self.studio.is_none() {
             let name = &self.name;
             say(format_args!(
                 "note: {name} has no camera; one was found that sees all of it (--view, --margin, --print-scene)"
             ));
         }
+    }
+
+    /// Has a model by itself play its first animation, where none was named, and bring its cameras.
+    pub fn show(&mut self, plays: bool, cameras: bool) {
+        let Some(mut studio) = self.studio.clone().filter(|_| plays || cameras) else { return };
+        if plays && studio.animation.is_none() {
+            studio.animation = Some("0".to_owned());
+        }
+        studio.cameras |= cameras;
+        self.stage(studio);
+    }
+
+    /// Shows a model by itself in another way.
+    pub fn stage(&mut self, studio: StudioSettings) {
+        if let Some((called, _)) = &self.assets.model {
+            self.parsed = Parsed::of_model(&self.name, called, &studio);
+            self.studio = Some(studio);
+        }
+    }
+
+    /// Whether it is a glTF model by itself.
+    pub fn is_gltf(&self) -> bool {
+        let ending = |name: &str| name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase());
+        let called = self.assets.model.as_ref().and_then(|(called, _)| ending(called));
+        matches!(called.as_deref(), Some("glb" | "gltf")) || self.model_bytes().is_ok_and(|bytes| is_gltf(&bytes))
     }
 
     /// The bytes of the model's own file.
@@ -327,7 +377,7 @@ impl Input {
             strict: self.strict,
             time,
             framing: self.framing,
-            light: self.is_model,
+            studio: self.studio.clone(),
             progress,
             cache: None,
             texture_memory: self.texture_memory.map(|mib| u64::from(mib) << 20),

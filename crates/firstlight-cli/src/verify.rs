@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 
 use firstlight::{
     Compiled, FileSettings, Film, Format, ImageError, Plane, PlaneDifference, ReceiptFault, ReceiptSettings,
-    RenderSettings, Scene, StoredPlane, StoredPlanes, UpAxis, builtin_scenes, display_steps,
+    RenderSettings, Scene, StoredPlane, StoredPlanes, builtin_scenes, display_steps,
 };
 use serde_json::{Value, json};
 
-use crate::args::{Axis, ReadingArgs, VerifyArgs};
+use crate::args::{ModelArgs, ReadingArgs, VerifyArgs};
 use crate::difference::{self, Found};
 use crate::input::{self, Input};
 use crate::interrupt::Watch;
@@ -92,7 +92,8 @@ fn scenes_in(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let mut files = read().map_err(|e| Failure::Work(format!("--scene {}: {e}", shown(folder))))?;
     let is_scene = |path: &PathBuf| {
         let ending = path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
-        matches!(ending.as_deref(), Some("toml" | "json" | "txt" | "ply" | "stl" | "obj")) && path.is_file()
+        matches!(ending.as_deref(), Some("toml" | "json" | "txt" | "ply" | "stl" | "obj" | "glb" | "gltf"))
+            && path.is_file()
     };
     files.retain(is_scene);
     files.sort();
@@ -101,18 +102,17 @@ fn scenes_in(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 
 /// Reads and compiles a scene, with what the receipt says in the place of it.
 fn open(path: &Path, said: &ReceiptSettings, args: &VerifyArgs) -> Result<(Input, Compiled), Failure> {
-    let model = said.model.as_ref();
-    let reading = ReadingArgs {
-        strict: false,
-        allow_dir: args.allow_dir.clone(),
-        texture_memory: None,
-        smooth: model.and_then(|model| model.smooth_deg),
-        up: model.map(|model| if model.up == UpAxis::Z { Axis::Z } else { Axis::Y }),
-    };
-    let mut input = input::read(path, &reading).map_err(|failure| match failure {
-        Failure::Usage(_) => Failure::Work(format!("{}: is a scene, and the picture was made of a model", shown(path))),
-        failure => failure,
-    })?;
+    let allow_dir = args.allow_dir.clone();
+    let reading = ReadingArgs { strict: false, allow_dir, texture_memory: None, model: ModelArgs::default() };
+    let mut input = input::read(path, &reading)?;
+    match (&said.model, &input.studio) {
+        (Some(_), None) => {
+            let name = shown(path);
+            return Err(Failure::Work(format!("{name}: is a scene, and the picture was made of a model")));
+        }
+        (Some(studio), Some(_)) => input.stage(studio.clone()),
+        (None, _) => {}
+    }
     said.apply(&mut input.parsed.desc);
     input.framing = said.framing.unwrap_or(input.framing);
     if input.parsed.desc.render.motion_to.is_some() {

@@ -188,7 +188,7 @@ pub fn common(shape: &mut ShapeDesc) -> Common<'_> {
             }
         };
     }
-    of!(Sphere Parallelogram Plane Disk Rectangle Box Cylinder Cone Torus Mesh PointSet Instance)
+    of!(Sphere Parallelogram Plane Disk Rectangle Box Cylinder Cone Torus Mesh PointSet Instance Model)
 }
 
 /// What materials of all kinds can say, but for those that are unlit.

@@ -9,8 +9,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use firstlight::{
-    CameraDesc, CompileOptions, DVec3, FolderAssets, Format, ModelSettings, RenderSettings, SceneDesc, TransformDesc,
-    render, write_whole,
+    CameraDesc, CompileOptions, DVec3, FolderAssets, Format, RenderSettings, SceneDesc, Studio, StudioSettings,
+    TransformDesc, render, write_whole,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -22,14 +22,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     turn(Path::new(&model), Path::new(&folder), pictures, 256)
 }
 
-/// Writes `pictures` pictures of a model (.ply, .stl, .obj), seen from all around, to `000.png`, `001.png` and so on.
+/// Writes `pictures` pictures of a model (.glb, .gltf, .obj, .ply, .stl), seen from all around, to `000.png`, `001.png` and so on.
 fn turn(model: &Path, folder: &Path, pictures: u32, size: u32) -> Result<(), Box<dyn Error>> {
     let name = model.file_name().and_then(|name| name.to_str()).ok_or("the model's file has no name")?;
     let assets = FolderAssets::new(model.parent().unwrap_or(Path::new("")), &[]).map_err(|(_, why)| why)?;
-    // A scene around the model. It is given a light, and a camera, which is replaced below
-    let mut desc = SceneDesc::of_model(name, &ModelSettings { smooth_deg: Some(60.0), ..ModelSettings::default() });
+    // A scene around the model. It is given lights, and a camera, which is replaced below
+    let studio = StudioSettings { studio: Studio::Hard, ..StudioSettings::default() };
+    let mut desc = SceneDesc::of_model(name, &studio);
     (desc.render.width, desc.render.height) = (size, size);
-    let options = CompileOptions { light: true, ..CompileOptions::default() };
+    let options = CompileOptions { studio: Some(studio), ..CompileOptions::default() };
     // Compiled once: the model is read and its tree built here and nowhere else
     let scene = desc.compile(&assets, &options)?.scene;
     let [low, high] = scene.summary().bounds.ok_or("the model is empty")?.map(DVec3::from);

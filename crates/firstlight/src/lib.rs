@@ -68,6 +68,7 @@ mod integrate;
 mod light;
 mod material;
 mod math;
+mod model;
 mod parallel;
 mod render;
 mod scene;
@@ -81,7 +82,7 @@ pub use camera::{Camera, CameraDesc, FilmPlane, Frame, Orthographic, Pinhole, Pr
 pub use color::{Display, Encoding, Rgb, ToneMapping};
 pub use context::{AssetError, Assets, CompileStage, FolderAssets, MemoryAssets, NoAssets, OnCompile};
 pub use describe::nearest_name;
-pub use describe::{Channel, ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, SamplesDesc, ScaleDesc};
+pub use describe::{Channel, ColorDesc, ColorParam, FilePath, NameMap, NumberParam, ParamDesc, SamplesDesc, ScaleDesc};
 pub use error::{Diagnostic, Place, SceneError, Severity, printable};
 pub use film::{
     AaMode, Coco, Film, Heat, LightChange, Mask, ObjectMasks, ReceiptFault, ReceiptSettings, RelightError, Relit,
@@ -94,7 +95,9 @@ pub use image::{
     StagedFile, StoredImage, StoredPlane, StoredPlanes, Window, Written, display_bytes, display_steps, encode_planes,
     false_colors, is_decoding, relative_differences, write_open, write_whole,
 };
-pub use import::{ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, is_point_set, read_mesh};
+pub use import::{
+    ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, is_gltf, is_point_set, read_mesh,
+};
 pub use light::{
     DirectionalDesc, DiskLightDesc, EmitSides, Falloff, LightDesc, PointDesc, RectangleDesc, SampleSet,
     SphereLightDesc, SpotDesc,
@@ -106,14 +109,14 @@ pub use material::{
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
 pub use render::{LightCounts, RenderStats, render, render_image};
 pub use scene::{
-    Added, CameraHit, CastHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, ModelSettings, MotionTo,
-    RenderDesc, Scene, SceneDesc, SceneSummary, SurfacePoint, UpAxis, View,
+    Added, CameraHit, CastHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, MotionTo, RenderDesc, Scene,
+    SceneDesc, SceneSummary, Studio, StudioSettings, SurfacePoint, View,
 };
 pub use scene::{Builtin, Parsed, TEXTURE_MEMORY, builtin_scenes, reference, schema};
 pub use shape::{
-    BoxDesc, CompileCache, ConeDesc, CylinderDesc, DiskDesc, Footprint, GroupDesc, InstanceDesc, MeshDesc,
+    BoxDesc, CompileCache, ConeDesc, CylinderDesc, DiskDesc, Footprint, GroupDesc, InstanceDesc, MeshDesc, ModelDesc,
     ParallelogramDesc, PlaneDesc, PointSetDesc, RayDifferential, RectangleShapeDesc, ShadowTerminator, ShapeDesc,
-    SphereDesc, SphereUv, TorusDesc, UvEdge,
+    SphereDesc, SphereUv, TorusDesc, UpAxis, UvEdge,
 };
 pub use texture::{CheckerboardDesc, Filter, ImageTextureDesc, TextureDesc, TextureSpace, UvGridDesc, Wrap};
 pub use transform::{Interpolation, TransformDesc, TransformKeyDesc};

@@ -2,6 +2,7 @@
 
 use firstlight::{
     BufferDesc, ColorDesc, LightDesc, MotionTo, RenderDesc, SampleSet, SamplesDesc, SceneDesc, ShadowTerminator,
+    ShapeDesc,
 };
 
 use crate::args::Size;
@@ -57,7 +58,10 @@ impl Overrides<'_> {
             render.camera = Some(name.to_owned());
         }
         let there = self.motion_to.and_then(|to| if let MotionTo::Camera(name) = to { Some(&**name) } else { None });
-        for (option, name) in [("--camera", self.camera), ("--motion-to", there)] {
+        // Those of models are known once their files are read
+        let brings_cameras = |shape: &ShapeDesc| matches!(shape, ShapeDesc::Model(model) if model.cameras);
+        let is_known = desc.shapes.iter().all(|shape| !brings_cameras(shape));
+        for (option, name) in [("--camera", self.camera), ("--motion-to", there)].into_iter().filter(|_| is_known) {
             if let Some(name) = name.filter(|name| !desc.cameras.iter().any(|(known, _)| known == name)) {
                 return Err(Failure::Usage(no_such_camera(option, name, desc)));
             }

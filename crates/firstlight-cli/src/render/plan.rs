@@ -43,6 +43,8 @@ pub(super) struct Plan<'a> {
     pub view: Option<View>,
     pub margin: Option<f64>,
     pub time: f64,
+    /// Whether a moment was said: models play their first animation then.
+    pub plays: bool,
     pub frames: Option<Frames>,
     pub shard: Option<Shard>,
     pub quiet: bool,
@@ -188,6 +190,7 @@ impl<'a> Plan<'a> {
             view: args.view,
             margin: args.margin,
             time: args.time.unwrap_or(0.0),
+            plays: args.time.is_some() || args.frames.is_some(),
             frames,
             shard: args.shard,
             quiet,
@@ -315,6 +318,7 @@ impl<'a> Plan<'a> {
         if input.parsed.faults().iter().any(|fault| fault.severity == firstlight::Severity::Error) {
             input.compile(self.time, self.quiet)?;
         }
+        input.show(self.plays, self.overrides.camera.is_some());
         self.overrides.apply(&mut input.parsed.desc)?;
         self.frame(input)?;
 

@@ -2,8 +2,8 @@
 
 use firstlight::{
     BoxDesc, CameraDesc, CameraHit, ColorParam, CompileOptions, CylinderDesc, DVec3, DiskLightDesc, Image, LightDesc,
-    LightId, MemoryAssets, MeshDesc, ModelSettings, NoAssets, PlaneDesc, PointSetDesc, RayDifferential, RenderSettings,
-    SampleSet, Scene, SceneDesc, ShapeDesc, SphereLightDesc, WorldRay, read_mesh,
+    LightId, MemoryAssets, MeshDesc, NoAssets, PlaneDesc, PointSetDesc, RayDifferential, RenderSettings, SampleSet,
+    Scene, SceneDesc, ShapeDesc, SphereLightDesc, Studio, StudioSettings, WorldRay, read_mesh,
 };
 
 use firstlight_testkit::Random;
@@ -238,9 +238,10 @@ fn a_file_keeps_its_digits_far_from_0() {
 fn the_automatic_camera_takes_every_model_that_the_reader_takes() {
     let shot = |at: V, size: f64| {
         let files = [("box.obj".to_owned(), obj(at, size))].into_iter().collect();
-        let mut desc = SceneDesc::of_model("box.obj", &ModelSettings::default());
+        let studio = StudioSettings { studio: Studio::Hard, ..StudioSettings::default() };
+        let mut desc = SceneDesc::of_model("box.obj", &studio);
         (desc.render.width, desc.render.height) = (64, 64);
-        let options = CompileOptions { light: true, ..CompileOptions::default() };
+        let options = CompileOptions { studio: Some(studio), ..CompileOptions::default() };
         match desc.compile(&MemoryAssets { files }, &options) {
             Ok(compiled) => picture(&compiled.scene, &adaptive()),
             Err(error) => panic!("{size} m at {at:?}: {error}"),

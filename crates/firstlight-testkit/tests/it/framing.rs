@@ -4,8 +4,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use firstlight::{
-    CompileOptions, DVec3, FolderAssets, Framing, ModelSettings, Scene, SceneDesc, UpAxis, View, is_point_set,
-    read_mesh,
+    CompileOptions, DVec3, FolderAssets, Framing, Scene, SceneDesc, Studio, StudioSettings, UpAxis, View, read_mesh,
 };
 
 /// Pixels across and down.
@@ -33,11 +32,10 @@ fn models() -> Vec<PathBuf> {
 
 fn compiled(model: &Path, framing: Framing, up: UpAxis) -> Scene {
     let assets = FolderAssets::new(model.parent().unwrap(), &[]).unwrap();
-    let points = is_point_set(&std::fs::read(model).unwrap());
-    let settings = ModelSettings { up, points, ..ModelSettings::default() };
+    let settings = StudioSettings { studio: Studio::Hard, up: Some(up), ..StudioSettings::default() };
     let mut desc = SceneDesc::of_model(model.file_name().unwrap().to_str().unwrap(), &settings);
     [desc.render.width, desc.render.height] = SIZE;
-    let options = CompileOptions { framing, light: true, ..CompileOptions::default() };
+    let options = CompileOptions { framing, studio: Some(settings), ..CompileOptions::default() };
     desc.compile(&assets, &options).unwrap_or_else(|e| panic!("{}: {e}", model.display())).scene
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use firstlight::{
     CastHit, CompileCache, CompileOptions, Compiled, DVec3, MemoryAssets, MeshData, MeshDesc, SceneDesc, ShapeDesc,
-    TransformDesc, Vec3, WorldRay,
+    Studio, StudioSettings, TransformDesc, Vec3, WorldRay,
 };
 
 use crate::scenes::*;
@@ -192,9 +192,10 @@ fn vertices_of_no_face_change_nothing() {
     // Its own camera and light see all of it
     let picture_of = |text: &str| {
         let assets = MemoryAssets { files: [("a.obj".to_owned(), text.as_bytes().to_vec())].into() };
-        let mut desc = SceneDesc::of_model("a.obj", &Default::default());
+        let studio = StudioSettings { studio: Studio::Hard, ..StudioSettings::default() };
+        let mut desc = SceneDesc::of_model("a.obj", &studio);
         (desc.render.width, desc.render.height) = (32, 32);
-        let options = CompileOptions { strict: true, light: true, ..CompileOptions::default() };
+        let options = CompileOptions { strict: true, studio: Some(studio), ..CompileOptions::default() };
         let compiled = desc.compile(&assets, &options).unwrap_or_else(|error| panic!("{error}"));
         (bits(&picture(&compiled.scene, &one_thread())), compiled.advice, compiled.added)
     };

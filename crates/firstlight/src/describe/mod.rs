@@ -243,6 +243,7 @@ pub(crate) use words;
 
 pub(crate) mod family;
 pub(crate) mod info;
+mod name_map;
 pub(crate) mod node;
 pub(crate) mod read;
 mod scan;
@@ -253,6 +254,7 @@ pub(crate) mod write;
 
 pub(crate) use family::{Family, TableInfo, family};
 pub(crate) use info::{Choice, FieldInfo};
+pub use name_map::NameMap;
 pub use read::nearest_name;
 pub(crate) use read::{Fields, Table, Value, Words, nearest};
 pub use value::{Channel, ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, SamplesDesc, ScaleDesc};

@@ -14,6 +14,8 @@ pub(crate) enum TextValue {
         width: usize,
         numbers: Vec<f64>,
     },
+    /// An inline table of texts.
+    Names(Vec<(String, String)>),
     /// An inline table.
     Table(Vec<(&'static str, TextValue)>),
 }
@@ -51,6 +53,12 @@ fn toml_string(text: &str) -> String {
 /// A string as JSON writes it.
 pub(crate) fn json_string(text: &str) -> String {
     serde_json::Value::from(text).to_string()
+}
+
+/// Pairs in braces, on one line.
+fn in_braces(pairs: impl Iterator<Item = String>) -> String {
+    let pairs: Vec<String> = pairs.collect();
+    if pairs.is_empty() { "{}".into() } else { format!("{{ {} }}", pairs.join(", ")) }
 }
 
 /// Numbers in brackets.
@@ -106,13 +114,8 @@ impl TextValue {
             TextValue::Text(v) => toml_string(v),
             TextValue::List(v) => format!("[{}]", v.iter().map(Self::to_toml).collect::<Vec<_>>().join(", ")),
             TextValue::Rows { width, numbers } => rows(*width, numbers, |v| TextValue::Number(v).to_toml()),
-            TextValue::Table(v) => {
-                let pairs: Vec<String> = v.iter().map(|(k, v)| format!("{} = {}", key(k), v.to_toml())).collect();
-                if pairs.is_empty() {
-                    return "{}".into();
-                }
-                format!("{{ {} }}", pairs.join(", "))
-            }
+            TextValue::Names(v) => in_braces(v.iter().map(|(k, v)| format!("{} = {}", key(k), toml_string(v)))),
+            TextValue::Table(v) => in_braces(v.iter().map(|(k, v)| format!("{} = {}", key(k), v.to_toml()))),
         }
     }
 
@@ -126,14 +129,8 @@ impl TextValue {
             TextValue::Text(v) => json_string(v),
             TextValue::List(v) => format!("[{}]", v.iter().map(Self::to_json).collect::<Vec<_>>().join(", ")),
             TextValue::Rows { width, numbers } => rows(*width, numbers, |v| TextValue::Number(v).to_json()),
-            TextValue::Table(v) => {
-                let pairs: Vec<String> =
-                    v.iter().map(|(k, v)| format!("{}: {}", json_string(k), v.to_json())).collect();
-                if pairs.is_empty() {
-                    return "{}".into();
-                }
-                format!("{{ {} }}", pairs.join(", "))
-            }
+            TextValue::Names(v) => in_braces(v.iter().map(|(k, v)| format!("{}: {}", json_string(k), json_string(v)))),
+            TextValue::Table(v) => in_braces(v.iter().map(|(k, v)| format!("{}: {}", json_string(k), v.to_json()))),
         }
     }
 

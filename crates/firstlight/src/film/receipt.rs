@@ -7,7 +7,7 @@ use crate::image::cryptomatte::{self, Named};
 use crate::image::{Buffer, LightPart, Plane, Receipt};
 use crate::light::Light;
 use crate::math::Vec3;
-use crate::scene::{Choices, Framing, ModelSettings, Scene};
+use crate::scene::{Choices, Framing, Scene};
 
 /// Samples of so many lights are listed one by one.
 const MOST_LISTED: usize = 1000;
@@ -52,10 +52,7 @@ impl Scene {
             entries.push(("view", numbers([view.azimuth_deg, view.elevation_deg])));
             entries.push(("margin", margin.to_string()));
         }
-        if let Some(ModelSettings { smooth_deg, up, .. }) = model {
-            entries.push(("up", up.name().to_owned()));
-            entries.extend(smooth_deg.map(|angle| ("smooth_deg", angle.to_string())));
-        }
+        entries.extend(model.iter().map(|model| ("model", model.to_json())));
         entries.extend(Self::matrices(&self.camera));
         // Only integration, and light shared by several rays, depend on the tolerance
         let is_integrated =

@@ -9,7 +9,7 @@ use crate::color::Display;
 use crate::describe::{ColorDesc, SamplesDesc};
 use crate::image::{BufferDesc, Plane, Receipt, Window};
 use crate::light::LightDesc;
-use crate::scene::{Framing, ModelSettings, MotionTo, Scene, SceneDesc, UpAxis, View};
+use crate::scene::{Framing, MotionTo, Scene, SceneDesc, StudioSettings, View};
 use crate::shape::ShadowTerminator;
 
 /// The settings in a [`Receipt`], by which its picture can be rendered again: [`apply`](Self::apply) to
@@ -25,8 +25,8 @@ pub struct ReceiptSettings {
     pub time: f64,
     /// How the camera was found, if it was.
     pub framing: Option<Framing>,
-    /// How the model was read, if the scene is one by itself; `points` is left to its file.
-    pub model: Option<ModelSettings>,
+    /// How the model was shown, if the scene is one by itself.
+    pub model: Option<StudioSettings>,
     /// In steps of an 8-bit picture, where anything was judged by it.
     pub tolerance: Option<f64>,
     /// How 8- and 16-bit files show the film.
@@ -146,7 +146,6 @@ impl ReceiptSettings {
         let background = |text: &str| if text == TRANSPARENT { Some(None) } else { color(text).map(Some) };
         let view = from.optional("view", |text| numbers(text, ' ').map(|[around, above]| View::new(around, above)))?;
         let framing = |view| Ok(Framing { view, margin: from.required("margin", number)? });
-        let model = |up| Ok(ModelSettings { up, smooth_deg: from.optional("smooth_deg", number)?, points: false });
         let crop =
             |text: &str| numbers(text, ',').map(|[x, y, width, height]: [u32; 4]| Window { x, y, width, height });
         let visibility = |text: &str| match text {
@@ -160,7 +159,7 @@ impl ReceiptSettings {
             scene_hash: from.required("scene_hash", text)?,
             time: from.optional("time", number)?.unwrap_or(0.0),
             framing: view.map(framing).transpose()?,
-            model: from.optional("up", UpAxis::from_name)?.map(model).transpose()?,
+            model: from.optional("model", StudioSettings::from_json)?,
             tolerance: from.optional("tolerance", number)?,
             display: from.optional("display", number)?,
             buffers: from.optional("buffers", buffers)?.unwrap_or_else(|| vec![Plane::Color.into()]),
@@ -263,7 +262,7 @@ mod tests {
             ("view", "1"),
             ("visibility", "x"),
             ("tolerance", "one"),
-            ("up", "x"),
+            ("model", "x"),
             ("motion_to", "north"),
         ] {
             let with = [&LEAST[..], &[(key, value)]].concat();

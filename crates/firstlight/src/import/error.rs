@@ -3,20 +3,24 @@
 use std::fmt;
 
 /// Where in a mesh file something stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum MeshPlace {
     /// A line of text, 1-based.
     Line(u64),
     /// A byte of binary data, counted from 0 at the start of the file.
     Byte(u64),
+    /// A JSON pointer; empty for the file as a whole.
+    Json(String),
 }
 
-/// `:12` after a file's name, or `, byte 480`.
+/// `:12` after a file's name, or `, byte 480`, or `, /meshes/0`.
 impl fmt::Display for MeshPlace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             MeshPlace::Line(line) => write!(f, ":{line}"),
             MeshPlace::Byte(byte) => write!(f, ", byte {byte}"),
+            MeshPlace::Json(pointer) if pointer.is_empty() => Ok(()),
+            MeshPlace::Json(pointer) => write!(f, ", {pointer}"),
         }
     }
 }

@@ -3,6 +3,11 @@
 
 use super::{obj, ply, stl};
 
+/// Whether these are the bytes of a glTF file, JSON or binary.
+pub fn is_gltf(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"glTF") || foreign(bytes, WantedFile::Mesh).is_some_and(|kind| kind.family == FileFamily::Gltf)
+}
+
 /// A file of a kind that is not what was wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Foreign {
@@ -16,6 +21,8 @@ pub(crate) struct Foreign {
 enum FileFamily {
     /// A mesh that is read, where a scene is wanted.
     Mesh,
+    /// glTF, which is a model by itself.
+    Gltf,
     /// A model or scene of which only meshes could be used, once exported.
     Model,
     /// Numbered points.
@@ -52,6 +59,7 @@ impl Foreign {
     pub fn hint(self, wanted: WantedFile) -> &'static str {
         match (self.family, wanted) {
             (FileFamily::Mesh, _) => "give it as a model, or name it as the file of a [[mesh]] or [[point_set]]",
+            (FileFamily::Gltf, _) => "give it as a model, or name it as the file of a [[model]]",
             (FileFamily::Model, _) => "that kind is not read yet; export it as PLY, STL or OBJ",
             (FileFamily::Cloud, _) => "that kind is not read yet; convert it to PLY",
             (FileFamily::Scene, _) => "scenes of other programs are not read; export their meshes as PLY or OBJ",
@@ -69,7 +77,7 @@ impl Foreign {
 
 /// First bytes, and what they are the first bytes of.
 const MAGIC: &[(&[u8], &str, FileFamily)] = &[
-    (b"glTF", "a binary glTF model (GLB)", FileFamily::Model),
+    (b"glTF", "a binary glTF model (GLB)", FileFamily::Gltf),
     (b"BLENDER", "a Blender file", FileFamily::Model),
     (b"Kaydara FBX Binary", "an FBX model", FileFamily::Model),
     (b"; FBX ", "an FBX model", FileFamily::Model),
@@ -218,7 +226,7 @@ fn text(bytes: &[u8], head: &[u8], wanted: WantedFile) -> Option<Foreign> {
         let has = |word: &[u8]| has(first, word) || has(last, word);
         let parts: [&[u8]; 5] = [b"\"meshes\"", b"\"nodes\"", b"\"buffers\"", b"\"accessors\"", b"\"scenes\""];
         if has(b"\"asset\"") && parts.iter().any(|part| has(part)) {
-            return is("a glTF model", FileFamily::Model);
+            return is("a glTF model", FileFamily::Gltf);
         }
         return if wanted == WantedFile::Mesh { is("JSON text", FileFamily::Other) } else { None };
     }

@@ -16,6 +16,7 @@
 mod error;
 mod foreign;
 mod given;
+mod gltf;
 mod obj;
 mod ply;
 mod polygon;
@@ -33,8 +34,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::math::{DVec3, origin_for};
 use error::ImportFault;
 pub use error::{ImportError, MeshPlace};
+pub use foreign::is_gltf;
 pub(crate) use foreign::{WantedFile, foreign};
 pub(crate) use given::from_own_origin;
+pub(crate) use gltf::{
+    Contained, Gltf, GltfFault, GltfFiles, GltfNode, JsonPlace, MeshAddress, OpenFault, Pose, Uri, WithContained,
+};
 pub use report::MeshReport;
 pub(crate) use tidy::used_vertices;
 

@@ -143,6 +143,16 @@ impl LightDesc {
         }
     }
 
+    /// Moves it.
+    pub(crate) fn set_transform(&mut self, moved: Option<Box<TransformDesc>>) {
+        of_table!(self, light => light.transform = moved);
+    }
+
+    /// Names it.
+    pub(crate) fn set_name(&mut self, said: Option<String>) {
+        of_table!(self, light => light.name = said);
+    }
+
     /// Its name, if it has one.
     pub fn name(&self) -> Option<String> {
         of_table!(self, light => light.name.clone())

@@ -23,7 +23,7 @@ pub(crate) use roots::{bracketed, depressed_cubic};
 pub(crate) use sum::{LANES, LaneSum};
 pub(crate) use trig::{asin, sin_cos, sin_cos_of_turns};
 
-pub use glam::{DAffine3, DMat3, DQuat, DVec3, Mat3, Vec2, Vec3};
+pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, Mat3, Vec2, Vec3};
 
 /// Half the distance between 1 and the next `f32`: the relative error of one rounded operation.
 pub(crate) const UNIT_ROUNDOFF: f32 = f32::EPSILON * 0.5;

@@ -327,7 +327,7 @@ fn corners([low, high]: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
 mod tests {
     use crate::context::MemoryAssets;
     use crate::scene::text::Parsed;
-    use crate::scene::{CompileOptions, Framing, ModelSettings, SceneDesc, View};
+    use crate::scene::{CompileOptions, Framing, SceneDesc, StudioSettings, View};
 
     /// What is said of a scene, strictly compiled.
     fn said(text: &str) -> Vec<String> {
@@ -430,11 +430,12 @@ mod tests {
         let mut assets = MemoryAssets::default();
         assets.files.insert("a.obj".into(), "v 0 0 0\nv 0 0 1\nv 1e-5 0 0\nf 1 2 3\n".into());
         let told = |antialiasing: u32| {
-            let mut parsed = Parsed::of_model("a.obj", "a.obj", &ModelSettings::default());
+            let mut parsed = Parsed::of_model("a.obj", "a.obj", &StudioSettings::default());
             parsed.desc.render.antialiasing = antialiasing;
             (parsed.desc.render.width, parsed.desc.render.height) = (32, 32);
             let framing = Framing { view: View::from_name("right").expect("is one"), margin: 0.1 };
-            let options = CompileOptions { light: true, framing, ..CompileOptions::default() };
+            let options =
+                CompileOptions { studio: Some(StudioSettings::default()), framing, ..CompileOptions::default() };
             let compiled = parsed.compile(&assets, &options).unwrap_or_else(|error| panic!("{error}"));
             compiled.advice.iter().map(ToString::to_string).collect::<Vec<_>>()
         };
@@ -573,8 +574,8 @@ mod tests {
         let of = |obj: &str| {
             let mut assets = MemoryAssets::default();
             assets.files.insert("a.obj".into(), obj.into());
-            let parsed = Parsed::of_model("folder/a.obj", "a.obj", &ModelSettings::default());
-            let options = CompileOptions { light: true, ..CompileOptions::default() };
+            let parsed = Parsed::of_model("folder/a.obj", "a.obj", &StudioSettings::default());
+            let options = CompileOptions { studio: Some(StudioSettings::default()), ..CompileOptions::default() };
             match parsed.compile(&assets, &options) {
                 Ok(compiled) => {
                     let all = compiled.warnings.iter().chain(&compiled.advice);

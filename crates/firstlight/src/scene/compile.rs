@@ -14,6 +14,7 @@ use super::occluders::ListedOccluders;
 use super::outline::ShapeOutline;
 use super::place::compile_shapes;
 use super::seen_lights::SeenLights;
+use super::studio::StudioSettings;
 use super::textures::{TextureRequests, Textures};
 use super::{Choices, DisplayEncoding, RenderDesc, Scene, SceneDesc, SceneSummary};
 use crate::camera::{Camera, CameraDesc};
@@ -21,6 +22,7 @@ use crate::color::{Display, Encoding, Rgb, ToneMapping};
 use crate::context::{Assets, CompileContext, OnCompile};
 use crate::describe::{Family, SamplesDesc};
 use crate::error::{Diagnostic, SceneError, Severity};
+use crate::import::WithContained;
 use crate::light::{Light, LightDesc, check_samples};
 use crate::material::{Ambient, Material};
 use crate::math::DVec3;
@@ -34,8 +36,8 @@ pub struct CompileOptions {
     pub strict: bool,
     /// How the camera frames the scene that a scene without one is given.
     pub framing: Framing,
-    /// A scene without lights is given one, from the upper left behind the camera.
-    pub light: bool,
+    /// The studio that the scene is given: its lights and its ground.
+    pub studio: Option<StudioSettings>,
     /// Told what is being done, for scenes that take their time.
     pub progress: Option<OnCompile>,
     /// What is kept from one compilation to the next, for a description that is compiled again and again.
@@ -99,23 +101,51 @@ impl SceneDesc {
     ) -> Option<(Scene, Added)> {
         let time = options.time;
         // What is compiled for two moments shares what does not move
-        let shared = self.render.motion_to.as_ref().map(|_| CompileCache::default());
+        let is_twice = self.render.motion_to.is_some() || options.studio.is_some();
+        let shared = is_twice.then(CompileCache::default);
         let cache = options.cache.as_ref().or(shared.as_ref());
         if let Some(cache) = cache {
             cache.begin();
         }
         cx.progress = options.progress.clone();
         cx.between("time", time, -MAX_TIME, MAX_TIME, Some("the moment to compile, in seconds"));
+        // Put the parts of models in place of them; what lies within their files is a file from here on
+        let mut files = MeshFiles { cache, ..MeshFiles::default() };
+        let said = self.with_models(cx, assets, &mut files);
+        let open = files.open.clone();
+        let assets = &WithContained { assets, files: &open.gltf };
+        said.compile_said(cx, assets, options, files, self)
+    }
+
+    /// The same of a description without models; `source` is the one it was made of.
+    fn compile_said(
+        &self,
+        cx: &mut CompileContext,
+        assets: &dyn Assets,
+        options: &CompileOptions,
+        mut files: MeshFiles<'_>,
+        source: &SceneDesc,
+    ) -> Option<(Scene, Added)> {
+        let (time, cache) = (options.time, files.cache);
         let picture = self.compile_render(cx);
         let mut textures = TextureRequests::new(self, assets, cache, options.texture_memory);
         textures.check(cx);
         let materials = self.compile_materials(cx, &mut textures);
         let textures = textures.finish(cx);
-        let mut files = MeshFiles { cache, ..MeshFiles::default() };
         let geometry = compile_shapes(self, &materials, cx, assets, &mut files);
         let origin = cx.origin;
         let bounds = geometry.as_ref().and_then(Geometry::bounds).map(|bounds| bounds.map(|corner| corner + origin));
-        let added = self.complete(cx, assets, options, &materials, geometry.as_ref());
+        let added = self.complete(cx, assets, options, &materials, geometry.as_ref(), (source, &files));
+        // A ground changes what rays meet; all else is kept from before
+        let geometry = match &added.ground {
+            Some(ground) => {
+                let mut shapes = self.clone();
+                shapes.shapes.push(ground.clone());
+                files.read.clear();
+                compile_shapes(&shapes, &materials, cx, assets, &mut files)
+            }
+            None => geometry,
+        };
         let desc = &*self.with(&added);
         let camera = desc.compile_camera(cx, picture.width, picture.height, geometry.is_some());
         let lights = desc.compile_lights(cx);
@@ -166,7 +196,7 @@ impl SceneDesc {
             textures: textures.compiled,
             summary,
         };
-        scene.motion = self.compile_motion(cx, assets, cache, desc, &scene);
+        scene.motion = self.compile_motion(cx, assets, (source, &files), desc, &scene);
         advise(cx, &scene, desc);
         Some((scene, added))
     }
@@ -179,6 +209,7 @@ impl SceneDesc {
         options: &CompileOptions,
         materials: &[Material],
         geometry: Option<&Geometry>,
+        (source, files): (&SceneDesc, &MeshFiles<'_>),
     ) -> Added {
         let Framing { view, margin } = options.framing;
         cx.between("view.azimuth_deg", view.azimuth_deg, -360.0, 360.0, Some("in degrees; 0 is in front"));
@@ -190,14 +221,15 @@ impl SceneDesc {
         // What moves is framed as it is at 0 s, so that a camera that was found stands still in all frames
         let still = if self.cameras.is_empty() && cx.keyed && options.time != 0.0 {
             let mut at_zero = CompileContext::at_time(0.0);
-            let files = &mut MeshFiles { cache: options.cache.as_ref(), ..MeshFiles::default() };
-            compile_shapes(self, materials, &mut at_zero, assets, files).map(|still| (still, at_zero.origin))
+            let files = &mut files.again();
+            let said = source.with_models(&mut at_zero, assets, files);
+            compile_shapes(&said, materials, &mut at_zero, assets, files).map(|still| (still, at_zero.origin))
         } else {
             None
         };
         let origin = still.as_ref().map_or(cx.origin, |(_, origin)| *origin);
         let outline = still.as_ref().map(|(still, _)| still).or(geometry).map(|seen| ShapeOutline::new(seen, origin));
-        self.lacks(outline.as_ref(), &options.framing, options.light)
+        self.lacks(outline.as_ref(), &options.framing, options.studio.as_ref())
     }
 
     /// The description with what was added; without its shapes, if anything was.

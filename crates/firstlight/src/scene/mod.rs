@@ -13,6 +13,7 @@ mod layers;
 mod light_spheres;
 mod links;
 mod model;
+mod models;
 mod motion;
 mod normals;
 mod occluders;
@@ -20,6 +21,7 @@ mod outline;
 mod place;
 mod seen_lights;
 mod shadow_rays;
+mod studio;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -38,8 +40,9 @@ pub use cast::CastHit;
 pub use compile::{CompileOptions, Compiled};
 pub(crate) use compile::{MAX_ANTIALIASING, MAX_SIDE};
 pub use description::{DisplayEncoding, RenderDesc, SceneDesc};
-pub use model::{Added, Framing, ModelSettings, UpAxis, View};
+pub use model::{Added, Framing, View};
 pub use motion::MotionTo;
+pub use studio::{Studio, StudioSettings};
 pub use text::{Parsed, reference, schema};
 pub use textures::TEXTURE_MEMORY;
 pub use trace::Hit;
@@ -130,7 +133,7 @@ pub(crate) struct Choices {
     /// Of a camera that was found.
     pub framing: Option<Framing>,
     /// Of a model by itself.
-    pub model: Option<ModelSettings>,
+    pub model: Option<StudioSettings>,
 }
 
 /// What a scene holds, for people.

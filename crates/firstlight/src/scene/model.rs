@@ -1,41 +1,12 @@
-//! What a scene is given that it does not say: a camera that sees all of it, and for a bare model a light.
+//! What a scene is given that it does not say: a camera that sees all of it, and for a bare model a studio.
 
 use super::SceneDesc;
 use super::outline::ShapeOutline;
+use super::studio::{Stage, StudioSettings};
 use crate::camera::CameraDesc;
-use crate::describe::{ColorDesc, FilePath, words};
-use crate::light::{DirectionalDesc, LightDesc};
+use crate::light::LightDesc;
 use crate::math::DVec3;
-use crate::shape::{MeshDesc, PointSetDesc, ShapeDesc};
-use crate::transform::TransformDesc;
-
-words! {
-    /// The axis of a model that points upwards.
-    pub enum UpAxis {
-        /// y, as everywhere in firstlight and in glTF.
-        Y = "y",
-        /// z, as in most scans, CAD programs and Blender.
-        Z = "z",
-    }
-}
-
-#[expect(clippy::derivable_impls, reason = "the macro has no place for a default")]
-impl Default for UpAxis {
-    fn default() -> Self {
-        UpAxis::Y
-    }
-}
-
-/// How a model is shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ModelSettings {
-    /// Makes normals smooth where faces meet at less than this angle, in degrees, 0 to 180; see `MeshDesc::smooth_deg`.
-    pub smooth_deg: Option<f64>,
-    /// Which axis points upwards.
-    pub up: UpAxis,
-    /// Whether the file holds points without faces.
-    pub points: bool,
-}
+use crate::shape::ShapeDesc;
 
 /// The direction that an automatic camera looks from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,9 +52,9 @@ impl View {
 }
 
 impl Default for View {
-    /// From the front, a little from the right and from above.
+    /// Three quarters: from the front, from the right and from above.
     fn default() -> Self {
-        View::new(25.0, 18.0)
+        View::new(35.0, 20.0)
     }
 }
 
@@ -107,21 +78,25 @@ impl Default for Framing {
     }
 }
 
-/// What a scene was given because it lacks it. A description with both added means the same picture, without anything
-/// being found.
+/// What a scene was given because it lacks it. A description with all of it added means the same picture, without
+/// anything being found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Added {
     /// A camera that sees all shapes, where the scene has no camera.
     pub camera: Option<CameraDesc>,
-    /// A light, where the scene has none and one was asked for.
-    pub light: Option<DirectionalDesc>,
+    /// The lights of a studio, where one was asked for.
+    pub lights: Vec<LightDesc>,
+    /// The ground of a studio.
+    pub ground: Option<ShapeDesc>,
 }
 
 impl Added {
     /// Adds it to the description.
     pub fn add_to(&self, desc: &mut SceneDesc) {
         desc.cameras.extend(self.camera.iter().map(|camera| (String::new(), camera.clone())));
-        desc.lights.extend(self.light.iter().map(|light| LightDesc::Directional(light.clone())));
+        desc.lights.extend(self.lights.iter().cloned());
+        desc.shapes.extend(self.ground.iter().cloned());
+        desc.sort();
     }
 }
 
@@ -131,56 +106,35 @@ const FOV_Y_DEG: f64 = 30.0;
 const NEAREST: f64 = 0.02;
 /// Views with a cosine of the elevation below this are straight from above or from below.
 const MIN_LEVEL: f64 = 1e-5;
-/// What the light is to the camera: to the left, up and back, in directions of the picture.
-const LIGHT_FROM: DVec3 = DVec3::new(-0.5, 0.75, 0.8);
 
 impl SceneDesc {
-    /// A scene that shows a model: one shape, no camera and no light. Compile it with
-    /// [`CompileOptions::light`](crate::CompileOptions::light), which adds a light.
-    pub fn of_model(file: &str, settings: &ModelSettings) -> Self {
-        let transform = (settings.up == UpAxis::Z)
-            .then(|| Box::new(TransformDesc { rotate_deg: [-90.0, 0.0, 0.0], ..TransformDesc::default() }));
-        let file = Some(FilePath(file.to_owned()));
-        let shape = if settings.points {
-            ShapeDesc::PointSet(PointSetDesc { file, transform, ..PointSetDesc::default() })
-        } else {
-            ShapeDesc::Mesh(MeshDesc { file, transform, smooth_deg: settings.smooth_deg, ..MeshDesc::default() })
-        };
-        let mut desc = SceneDesc { shapes: vec![shape], ..SceneDesc::default() };
-        desc.render.background = ColorDesc::linear(0.05, 0.055, 0.065);
-        desc.render.ambient = ColorDesc::linear(0.16, 0.17, 0.19).into();
-        desc
-    }
-
     /// What it lacks. `seen` is what a camera sees; `None` where that is not known, and then nothing is found.
-    pub(super) fn lacks(&self, seen: Option<&ShapeOutline>, framing: &Framing, light: bool) -> Added {
+    pub(super) fn lacks(
+        &self,
+        seen: Option<&ShapeOutline>,
+        framing: &Framing,
+        studio: Option<&StudioSettings>,
+    ) -> Added {
         let mut added = Added::default();
-        if self.cameras.is_empty() {
+        let Some(seen) = seen else { return added };
+        let bounds = seen.bounds();
+        // A bare model is always shown, whatever is in its file
+        let shown = bounds.or(studio.map(|_| [DVec3::NEG_ONE, DVec3::ONE]));
+        if let (true, Some(shown)) = (self.cameras.is_empty(), shown) {
             let size = [self.render.width, self.render.height].map(|n| f64::from(n.max(1)));
-            // A bare model is always shown, whatever is in its file
-            let nothing = || light.then(|| framing_of(&cube, [DVec3::NEG_ONE, DVec3::ONE], framing, size));
-            added.camera = match seen.map(|seen| (seen, seen.bounds())) {
-                Some((seen, Some(bounds))) => Some(framing_of(&|d| seen.support(d), bounds, framing, size)),
-                Some((_, None)) => nothing(),
-                None => None,
-            };
-            if let (Some(camera), Some(seen)) = (&mut added.camera, seen) {
-                for place in [&mut camera.position, &mut camera.look_at] {
-                    *place = (DVec3::from(*place) + seen.origin).to_array();
-                }
+            let support = |d: DVec3| if bounds.is_some() { seen.support(d) } else { cube(d) };
+            let mut camera = framing_of(&support, shown, framing, size);
+            for place in [&mut camera.position, &mut camera.look_at] {
+                *place = (DVec3::from(*place) + seen.origin).to_array();
             }
+            added.camera = Some(camera);
         }
-        if light && self.lights.is_empty() {
-            // From the upper left of the first camera
+        if let (Some(studio), Some([low, high])) = (studio, shown) {
             let camera = added.camera.as_ref().or(self.cameras.first().map(|(_, camera)| camera));
-            added.light = camera.map(|camera| {
-                let back = (DVec3::from(camera.position) - DVec3::from(camera.look_at)).normalize_or(DVec3::Z);
-                let right = DVec3::from(camera.up).cross(back).normalize_or(DVec3::X);
-                let from = right * LIGHT_FROM.x + back.cross(right) * LIGHT_FROM.y + back * LIGHT_FROM.z;
-                let mut light = DirectionalDesc::new((-from).to_array());
-                light.strength = 2.6;
-                light
-            });
+            let looked = camera.map_or(DVec3::Z, |camera| DVec3::from(camera.position) - DVec3::from(camera.look_at));
+            let middle = (low + high) * 0.5 + seen.origin;
+            let stage = Stage { middle, radius: ((high - low) * 0.5).length(), lowest: low.y + seen.origin.y };
+            (added.lights, added.ground) = studio.set_up(&stage, looked);
         }
         added
     }

@@ -19,7 +19,7 @@ use crate::error::{SceneError, Severity};
 use crate::ids::SurfaceId;
 use crate::light::LightDesc;
 use crate::math::{DAffine3, DVec3};
-use crate::shape::{CompileCache, MeshFiles};
+use crate::shape::MeshFiles;
 use crate::transform::{MAX_TIME, TransformDesc};
 
 /// Whereto `motion` leads from the picture: to another moment of the same camera, or to another camera at the same
@@ -134,12 +134,12 @@ pub(crate) struct Motion {
 
 impl SceneDesc {
     /// The scene where `[render] motion_to` says. `completed` is the description with the camera and the lights that
-    /// were found for it.
+    /// were found for it, `source` the one with its models.
     pub(super) fn compile_motion(
         &self,
         cx: &mut CompileContext,
         assets: &dyn Assets,
-        cache: Option<&CompileCache>,
+        (source, files): (&SceneDesc, &MeshFiles<'_>),
         completed: &SceneDesc,
         here: &Scene,
     ) -> Option<Arc<Motion>> {
@@ -170,8 +170,9 @@ impl SceneDesc {
         if cx.keyed && time != here.moment {
             let at = &mut CompileContext::at_time(time);
             at.progress = cx.progress.clone();
-            let geometry =
-                compile_shapes(self, &here.materials, at, assets, &mut MeshFiles { cache, ..MeshFiles::default() });
+            let files = &mut files.again();
+            let said = source.with_models(at, assets, files);
+            let geometry = compile_shapes(&said, &here.materials, at, assets, files);
             there.origin = at.origin;
             there.camera = completed.compile_camera(at, here.width, here.height, geometry.is_some());
             there.lights = completed.compile_lights(at);

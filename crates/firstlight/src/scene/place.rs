@@ -362,7 +362,8 @@ impl Compiler<'_, '_> {
             },
             ShapeDesc::Mesh(desc) => match desc.compile(cx, self.assets, self.files) {
                 Some(mut source) => {
-                    let faces = self.face_materials(cx, &source, desc.file.is_some(), named);
+                    let faces =
+                        self.face_materials(cx, &source, desc.file.is_some() && desc.materials.is_empty(), named);
                     uv_sets = source.data.uvs.len();
                     self.check_uv_sets_of_mesh(cx, desc, &source, &faces);
                     source.named = self.named_uv_sets(&source, &faces, is_in_group);
@@ -373,6 +374,8 @@ impl Compiler<'_, '_> {
                 }
                 None => Form::Nothing,
             },
+            // Models were replaced by their parts
+            ShapeDesc::Model(_) => Form::Nothing,
             ShapeDesc::Instance(desc) => match self.group_ids.get(desc.of.as_str()) {
                 Some(group) => Form::Instance(*group),
                 None => {

@@ -23,7 +23,7 @@ use crate::describe::read::Faults;
 use crate::error::{Diagnostic, SceneError, Severity};
 use crate::import::{WantedFile, foreign};
 use crate::scene::compile::{CompileOptions, Compiled};
-use crate::scene::model::ModelSettings;
+use crate::scene::studio::StudioSettings;
 
 /// Most bytes of all texts of a scene together: 64 MiB.
 const MAX_BYTES: u64 = 64 << 20;
@@ -55,7 +55,7 @@ struct ModelFile {
     name: String,
     /// What the description calls it.
     file: String,
-    settings: ModelSettings,
+    settings: StudioSettings,
 }
 
 impl From<SceneDesc> for Parsed {
@@ -83,7 +83,7 @@ impl Parsed {
         }
         match self.desc.compile(assets, options) {
             Ok(mut compiled) if self.faults.is_empty() => {
-                compiled.scene.choices.model = self.model.as_ref().map(|model| model.settings);
+                compiled.scene.choices.model = self.model.as_ref().map(|model| model.settings.clone());
                 Ok(Compiled {
                     warnings: self.of_file(self.sources.attach(compiled.warnings)),
                     advice: self.of_file(self.sources.attach(compiled.advice)),
@@ -106,8 +106,8 @@ impl Parsed {
 
     /// A scene that shows a model, as [`SceneDesc::of_model`] makes it; what is wrong with it is said of the file,
     /// which is called `name`, and not of a description that nobody wrote.
-    pub fn of_model(name: &str, file: &str, settings: &ModelSettings) -> Self {
-        let model = Some(ModelFile { name: name.to_owned(), file: file.to_owned(), settings: *settings });
+    pub fn of_model(name: &str, file: &str, settings: &StudioSettings) -> Self {
+        let model = Some(ModelFile { name: name.to_owned(), file: file.to_owned(), settings: settings.clone() });
         Self { model, ..SceneDesc::of_model(file, settings).into() }
     }
 
@@ -116,7 +116,8 @@ impl Parsed {
         let Some(ModelFile { name, file, .. }) = &self.model else { return list };
         for diagnostic in &mut list {
             let path = std::mem::take(&mut diagnostic.path);
-            let field = path.strip_prefix("mesh[0]").or(path.strip_prefix("point_set[0]"));
+            let field =
+                path.strip_prefix("model[0]").or(path.strip_prefix("mesh[0]")).or(path.strip_prefix("point_set[0]"));
             let field = field.map_or(path.as_str(), |field| field.trim_start_matches('.'));
             let message = &diagnostic.message;
             // The words of the readers begin with the file

@@ -146,7 +146,9 @@ impl<'a> TextureRequests<'a> {
         param: &NumberParam,
         range: [f64; 2],
     ) -> (Param<f32>, Option<usize>) {
-        let factor = cx.between(&factor_path(field, &param.texture), param.factor, range[0], range[1], None) as f32;
+        // A texture may be turned around: factor = -1, bias = 1
+        let least = if param.texture.is_some() { -range[1] } else { range[0] };
+        let factor = cx.between(&factor_path(field, &param.texture), param.factor, least, range[1], None) as f32;
         cx.between(&format!("{field}.bias"), param.bias, -MAX_BIAS, MAX_BIAS, Some("it is added after the factor"));
         let index = param.texture.as_ref().and_then(|name| self.find(cx, &format!("{field}.texture"), name));
         if let Some(index) = index {
@@ -448,7 +450,9 @@ impl Params for TextureRequests<'_> {
         let (desc, scratch) = (self.desc, &mut CompileContext::default());
         let grouped = desc.groups.iter().flat_map(|(_, group)| &group.shapes);
         let may_have_alphas = |shape: &ShapeDesc| match shape {
-            ShapeDesc::Mesh(mesh) => !mesh.alphas.is_empty() || mesh.file.as_ref().is_some_and(is_ply),
+            ShapeDesc::Mesh(mesh) => {
+                !mesh.alphas.is_empty() || mesh.file.as_ref().is_some_and(|file| is_ply(file) || is_contained(file))
+            }
             _ => false,
         };
         let is_needed = desc.shapes.iter().chain(grouped).any(may_have_alphas);
@@ -470,6 +474,11 @@ impl Params for TextureRequests<'_> {
 /// Whether a file is named as PLY files are, whose vertices may have an alpha.
 fn is_ply(file: &FilePath) -> bool {
     file.0.as_bytes().last_chunk().is_some_and(|end: &[u8; 4]| end.eq_ignore_ascii_case(b".ply"))
+}
+
+/// Whether a file is a part of another one, whose vertices may have an alpha.
+fn is_contained(file: &FilePath) -> bool {
+    file.0.contains('#')
 }
 
 /// Where the number of a parameter stands: a constant is the field itself.

@@ -8,7 +8,7 @@ use std::any::Any;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::import::MeshData;
+use crate::import::{GltfFiles, MeshData};
 
 /// A key: the BLAKE3 of all that something follows from.
 pub(crate) type ContentKey = [u8; 32];
@@ -114,6 +114,37 @@ pub(crate) struct MeshFiles<'a> {
     pub read: Vec<(String, ContentKey)>,
     /// What was made of them before.
     pub cache: Option<&'a CompileCache>,
+    /// Those that are open.
+    pub open: Arc<OpenFiles>,
+}
+
+impl<'a> MeshFiles<'a> {
+    /// The same files, for another moment.
+    pub fn again(&self) -> MeshFiles<'a> {
+        MeshFiles { read: Vec::new(), cache: self.cache, open: self.open.clone() }
+    }
+}
+
+/// The model files of a scene while it is compiled, each read once.
+#[derive(Debug, Default)]
+pub(crate) struct OpenFiles {
+    pub gltf: GltfFiles,
+    meshes: Mutex<HashMap<String, LoadedMesh>>,
+}
+
+/// A mesh of a file, and its key where something is kept.
+pub(crate) type LoadedMesh = (Arc<MeshData>, Option<ContentKey>);
+
+impl OpenFiles {
+    /// The mesh of a file that was read before.
+    pub fn mesh(&self, file: &str) -> Option<LoadedMesh> {
+        self.meshes.lock().unwrap_or_else(PoisonError::into_inner).get(file).cloned()
+    }
+
+    /// Keeps the mesh of a file.
+    pub fn keep(&self, file: &str, mesh: &LoadedMesh) {
+        self.meshes.lock().unwrap_or_else(PoisonError::into_inner).insert(file.to_owned(), mesh.clone());
+    }
 }
 
 /// The key of what follows from `parts` and is a `what`.

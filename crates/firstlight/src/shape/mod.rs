@@ -17,6 +17,7 @@ mod disk;
 mod frustum;
 mod group;
 mod mesh;
+mod model;
 mod parallelogram;
 mod placement;
 mod plane;
@@ -35,6 +36,7 @@ pub use cylinder::CylinderDesc;
 pub use disk::DiskDesc;
 pub use group::{GroupDesc, InstanceDesc};
 pub use mesh::MeshDesc;
+pub use model::{ModelDesc, UpAxis};
 pub use parallelogram::{Parallelogram, ParallelogramDesc};
 pub use plane::PlaneDesc;
 pub use point_set::PointSetDesc;
@@ -51,6 +53,7 @@ pub(crate) use common::Common;
 pub(crate) use cover::{Cover, LightSeen};
 pub(crate) use disk::{Disk, DiskShadow};
 pub(crate) use mesh::{JoinedPart, Mesh, MeshBuilder, MeshSource, NamedSets, TrianglePoint};
+pub(crate) use mesh::{load_mesh_file, read_mesh_bytes, unreadable};
 pub(crate) use parallelogram::{ParallelogramShadow, PlaneSide};
 pub(crate) use placement::Placement;
 pub(crate) use plane::UnboundedPlane;
@@ -90,6 +93,8 @@ family! {
         PointSet(PointSetDesc) = "point_set",
         /// `[[instance]]`
         Instance(InstanceDesc) = "instance",
+        /// `[[model]]`
+        Model(ModelDesc) = "model",
     }
 }
 
@@ -119,6 +124,7 @@ impl ShapeDesc {
             ShapeDesc::Mesh(desc) => desc.common(),
             ShapeDesc::PointSet(desc) => desc.common(),
             ShapeDesc::Instance(desc) => desc.common(),
+            ShapeDesc::Model(desc) => desc.common(),
         }
     }
 }

@@ -188,6 +188,14 @@ impl TransformDesc {
     }
 }
 
+/// Whether a matrix of a transform may be this: nothing is flat, too large, or no number.
+pub(crate) fn is_invertible(affine: &DAffine3) -> bool {
+    let [x, y, z] = [affine.matrix3.x_axis, affine.matrix3.y_axis, affine.matrix3.z_axis];
+    let sizes_fine = [x, y, z].iter().all(|c| SCALES.contains(&c.length()));
+    let place_fine = affine.translation.to_array().iter().all(|c| c.abs() <= *SCALES.end());
+    sizes_fine && place_fine && x.cross(y).dot(z).abs() > MIN_VOLUME * x.length() * y.length() * z.length()
+}
+
 /// Refuses a scale that flattens.
 fn check_scale(cx: &mut CompileContext, scale: ScaleDesc) {
     if !scale.xyz.iter().all(|s| SCALES.contains(&s.abs())) {

@@ -12,11 +12,14 @@ use std::sync::Arc;
 pub(crate) use join::MeshBuilder;
 pub(crate) use surface::{JoinedPart, Mesh, TrianglePoint};
 
-use super::cache::{CompileCache, ContentKey, MeshFiles, key_of};
+use super::cache::{CompileCache, ContentKey, LoadedMesh, MeshFiles, key_of};
 use super::common::shape_table;
 use crate::context::{AssetError, Assets, CompileContext, CompileStage, show};
 use crate::describe::FilePath;
-use crate::import::{MeshData, from_own_origin, read_mesh, used_vertices};
+use crate::describe::node::quoted;
+use crate::import::{
+    Contained, GltfFault, MeshAddress, MeshData, OpenFault, from_own_origin, read_mesh, used_vertices,
+};
 
 shape_table! {
     /// Triangles: from a PLY, STL or OBJ file, or written out.
@@ -33,7 +36,8 @@ shape_table! {
     /// material = "clay"
     /// ```
     pub struct MeshDesc {
-        /// The file, relative to the text that names it. Instead of all lists.
+        /// The file, relative to the text that names it. Instead of all lists. A mesh within a glTF file has the name
+        /// of the file and its address: `chair.glb#mesh/0`, or `chair.glb#node/4` as a node poses it.
         pub file: Option<FilePath> = None,
         /// Where the vertices are, in metres.
         pub positions: Vec<[f64; 3]> = Vec::new(),
@@ -52,7 +56,8 @@ shape_table! {
         pub colors: Vec<[f64; 3]> = Vec::new(),
         /// An alpha for each vertex, 0 to 1; without, 1.
         pub alphas: Vec<f64> = Vec::new(),
-        /// The names of materials that `face_materials` chooses from.
+        /// The names of materials that `face_materials` chooses from. Beside a file whose faces have materials: the
+        /// names in the scene of each of them, in the order of the file.
         pub materials: Vec<String> = Vec::new(),
         /// The material of each triangle, as a position in `materials`, counted from 0.
         pub face_materials: Vec<u32> = Vec::new(),
@@ -67,6 +72,19 @@ pub(crate) const MAX_MESH_FILE: u64 = 1 << 36;
 /// Coordinates beyond this, in metres, are refused, as everywhere in a scene.
 const MAX_COORDINATE: f64 = 2.5e8;
 
+/// Says that a mesh file cannot be had.
+pub(crate) fn unreadable(cx: &mut CompileContext, file: &FilePath, error: &AssetError) {
+    let colon = if matches!(error, AssetError::NotFound | AssetError::Io(_)) { ":" } else { "" };
+    let hint = match error {
+        AssetError::NotFound => "file names are relative to the text that names them",
+        AssetError::Outside => "copy it into the folder of the scene, or allow its folder with --allow-dir",
+        AssetError::TooLarge { .. } => "split it",
+        AssetError::Io(_) => "a mesh is a plain file that can be read",
+    };
+    let slashes = error.slashes(&file.0);
+    cx.error("file", format!("{:?}{colon} {error}", file.0), Some(slashes.as_deref().unwrap_or(hint)));
+}
+
 /// The bytes of the file of a mesh or point set, and their hash. `None` after an error.
 pub(crate) fn read_mesh_bytes(
     cx: &mut CompileContext,
@@ -77,15 +95,7 @@ pub(crate) fn read_mesh_bytes(
     let bytes = match assets.read(&file.0, MAX_MESH_FILE) {
         Ok(bytes) => bytes,
         Err(error) => {
-            let colon = if matches!(error, AssetError::NotFound | AssetError::Io(_)) { ":" } else { "" };
-            let hint = match error {
-                AssetError::NotFound => "file names are relative to the text that names them",
-                AssetError::Outside => "copy it into the folder of the scene, or allow its folder with --allow-dir",
-                AssetError::TooLarge { .. } => "split it",
-                AssetError::Io(_) => "a mesh is a plain file that can be read",
-            };
-            let slashes = error.slashes(&file.0);
-            cx.error("file", format!("{:?}{colon} {error}", file.0), Some(slashes.as_deref().unwrap_or(hint)));
+            unreadable(cx, file, &error);
             return None;
         }
     };
@@ -107,6 +117,90 @@ pub(crate) fn parse_mesh_file(cx: &mut CompileContext, file: &FilePath, bytes: &
             None
         }
     }
+}
+
+/// The mesh of a file, without vertices of no triangle and with normals of length 1. `None` after an error.
+pub(crate) fn load_mesh_file(
+    cx: &mut CompileContext,
+    assets: &dyn Assets,
+    file: &FilePath,
+    files: &mut MeshFiles<'_>,
+) -> Option<LoadedMesh> {
+    // One that is in no file
+    if let Some((data, content)) = files.cache.and_then(|cache| cache.given(&file.0)) {
+        files.read.push((file.0.clone(), content));
+        return Some((data, Some(content)));
+    }
+    if let Some((container, Contained::Mesh(address))) = Contained::split(&file.0) {
+        return load_contained(cx, assets, file, (container, &address), files);
+    }
+    if let Some(loaded) = files.open.mesh(&file.0) {
+        return Some(loaded);
+    }
+    let (bytes, hash) = read_mesh_bytes(cx, assets, file, files)?;
+    // The name may say how the bytes are to be read
+    let key = files.cache.map(|_| key_of("mesh file", [file.0.as_bytes(), &hash]));
+    let data = kept(files.cache, key, || {
+        let mut data = parse_mesh_file(cx, file, &bytes)?;
+        data.tidy();
+        Some(data)
+    })?;
+    let loaded = (data, key);
+    files.open.keep(&file.0, &loaded);
+    Some(loaded)
+}
+
+/// What is kept at a key, or else is made.
+fn kept(
+    cache: Option<&CompileCache>,
+    key: Option<ContentKey>,
+    make: impl FnOnce() -> Option<MeshData>,
+) -> Option<Arc<MeshData>> {
+    let place = cache.zip(key);
+    if let Some(data) = place.and_then(|(cache, key)| cache.find(&key)) {
+        return Some(data);
+    }
+    let data = Arc::new(make()?);
+    if let Some((cache, key)) = place {
+        cache.keep(key, &data);
+    }
+    Some(data)
+}
+
+/// A mesh within a glTF file. `None` after an error.
+fn load_contained(
+    cx: &mut CompileContext,
+    assets: &dyn Assets,
+    file: &FilePath,
+    (container, address): (&str, &MeshAddress),
+    files: &mut MeshFiles<'_>,
+) -> Option<LoadedMesh> {
+    let open = files.open.clone();
+    let gltf = match open.gltf.open(container, assets) {
+        Ok(gltf) => gltf,
+        Err(OpenFault::Read(error)) => {
+            unreadable(cx, &container.into(), &error);
+            return None;
+        }
+        Err(OpenFault::Damaged(error)) => {
+            cx.error("file", error.to_string(), None);
+            return None;
+        }
+    };
+    files.read.push((file.0.clone(), gltf.hash));
+    let key = files.cache.map(|_| key_of("mesh file", [file.0.as_bytes(), &gltf.hash]));
+    let fault = |cx: &mut CompileContext, fault: GltfFault| {
+        cx.error("file", fault.into_error(container).to_string(), None);
+    };
+    let data = kept(files.cache, key, || {
+        let mut data = gltf.mesh(address).map_err(|wrong| fault(cx, wrong)).ok()?;
+        data.tidy();
+        Some(data)
+    })?;
+    for note in &data.notes {
+        cx.warning("file", format!("{}, {note}", quoted(container)), None);
+    }
+    Some((data, key))
 }
 
 /// A mesh in its own space, checked.
@@ -154,6 +248,12 @@ impl MeshDesc {
     ) -> Option<MeshSource> {
         let before = cx.error_count();
         let (data, content) = self.load(cx, assets, files)?;
+        // One of many meshes of a file may be empty
+        let contained = self.file.as_ref().filter(|file| Contained::split(&file.0).is_some());
+        if let (true, Some(file)) = (data.triangles.is_empty(), contained) {
+            cx.warning("file", format!("{} holds no triangles", quoted(&file.0)), Some("nothing of it can be seen"));
+            return None;
+        }
         if data.triangles.is_empty() {
             let message = format!("holds {} points and no faces", data.positions.len());
             cx.error("file", message, Some("points are shown by [[point_set]], as spheres; PLY files can hold them"));
@@ -186,12 +286,7 @@ impl MeshDesc {
     }
 
     /// The mesh as it is said, and its key where something is kept. `None` after an error.
-    fn load(
-        &self,
-        cx: &mut CompileContext,
-        assets: &dyn Assets,
-        files: &mut MeshFiles<'_>,
-    ) -> Option<(Arc<MeshData>, Option<ContentKey>)> {
+    fn load(&self, cx: &mut CompileContext, assets: &dyn Assets, files: &mut MeshFiles<'_>) -> Option<LoadedMesh> {
         let Some(file) = &self.file else {
             let mut data = self.written(cx)?;
             data.tidy();
@@ -199,30 +294,27 @@ impl MeshDesc {
             return Some((Arc::new(data), content));
         };
         for (field, said) in self.lists() {
-            if said {
+            if said && field != "materials" {
                 cx.error(field, "it is said beside a file", Some("give the file, or the lists"));
             }
         }
-        // One that is in no file
-        if let Some((data, content)) = files.cache.and_then(|cache| cache.given(&file.0)) {
-            files.read.push((file.0.clone(), content));
-            return Some((data, Some(content)));
+        let (data, content) = load_mesh_file(cx, assets, file, files)?;
+        if self.materials.is_empty() {
+            return Some((data, content));
         }
-        let (bytes, hash) = read_mesh_bytes(cx, assets, file, files)?;
-        let parse = |cx: &mut CompileContext| {
-            let mut data = parse_mesh_file(cx, file, &bytes)?;
-            data.tidy();
-            Some(Arc::new(data))
+        // The scene's own names for the materials of the file
+        if self.materials.len() != data.materials.len() {
+            let message = format!("{} of them; the file has {}", self.materials.len(), data.materials.len());
+            cx.error("materials", message, Some("with a file: a name for each of its materials, in the file's order"));
+        }
+        let mut data = Arc::unwrap_or_clone(data);
+        data.materials.clone_from(&self.materials);
+        let keyed = |content: &ContentKey| {
+            let names = self.materials.iter().map(|name| name.as_bytes());
+            key_of("mesh with materials", [&content[..]].into_iter().chain(names))
         };
-        let Some(cache) = files.cache else { return Some((parse(cx)?, None)) };
-        // The name may say how the bytes are to be read
-        let key = key_of("mesh file", [file.0.as_bytes(), &hash]);
-        if let Some(data) = cache.find(&key) {
-            return Some((data, Some(key)));
-        }
-        let data = parse(cx)?;
-        cache.keep(key, &data);
-        Some((data, Some(key)))
+        let content = content.as_ref().map(keyed);
+        Some((Arc::new(data), content))
     }
 
     /// The mesh with the normals that `smooth_deg` asks for.

@@ -1,0 +1,290 @@
+//! The primitives of a mesh, as one [`MeshData`].
+//!
+//! Each primitive is a material of its own: number i of [`MeshData::materials`] is that of primitive i, whatever it
+//! says its material is, since variants of a file give primitives other materials.
+//!
+//! Source: "glTF 2.0 specification", section 3.7.
+
+use super::json::JsonPlace;
+use super::nodes::{GltfNode, Pose};
+use super::{Gltf, GltfFault};
+use crate::import::{MAX_COUNT, MeshData};
+use crate::math::{DAffine3, DMat3, DMat4, DVec3};
+
+/// Sets of texture coordinates that are read; textures can name no more.
+const UV_SETS: usize = 4;
+
+/// What of a mesh is read.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum MeshAddress {
+    /// Mesh number so much, with the weights of its own.
+    Mesh(usize),
+    /// The mesh of node number so much, as it is posed at rest or at a moment: by the weights of the node and, where it
+    /// has a skin, by its bones, which give it its place in the scene of the file.
+    Node(usize, Option<Pose>),
+}
+
+impl MeshAddress {
+    /// What stands behind `#` in the name of a file: `mesh/0`, `node/4`, `node/4/animation/0/time/1.5`.
+    pub fn parse(text: &str) -> Option<MeshAddress> {
+        let number = |text: &str| text.parse::<usize>().ok();
+        let parts: Vec<&str> = text.split('/').collect();
+        match parts[..] {
+            ["mesh", mesh] => Some(MeshAddress::Mesh(number(mesh)?)),
+            ["node", node] => Some(MeshAddress::Node(number(node)?, None)),
+            ["node", node, "animation", animation, "time", time] => {
+                let time = time.parse::<f64>().ok().filter(|time| time.is_finite())?;
+                Some(MeshAddress::Node(number(node)?, Some(Pose { animation: number(animation)?, time })))
+            }
+            _ => None,
+        }
+    }
+}
+
+impl std::fmt::Display for MeshAddress {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            MeshAddress::Mesh(mesh) => write!(f, "mesh/{mesh}"),
+            MeshAddress::Node(node, None) => write!(f, "node/{node}"),
+            MeshAddress::Node(node, Some(pose)) => {
+                write!(f, "node/{node}/animation/{}/time/{}", pose.animation, pose.time)
+            }
+        }
+    }
+}
+
+/// What moves the vertices of a primitive.
+struct Posing<'a> {
+    weights: &'a [f32],
+    /// What the bones of its skin do to the vertices: from the mesh to the scene.
+    bones: Option<&'a [DAffine3]>,
+}
+
+/// The shape of what an index list says.
+#[derive(Clone, Copy)]
+enum Topology {
+    Triangles,
+    Strip,
+    Fan,
+}
+
+impl Gltf {
+    /// The mesh at an address.
+    pub(crate) fn mesh(&self, address: &MeshAddress) -> Result<MeshData, GltfFault> {
+        let root = self.root();
+        let (index, weights, bones) = match address {
+            MeshAddress::Mesh(mesh) => (*mesh, None, None),
+            MeshAddress::Node(node, pose) => {
+                let at = root.nth("nodes", *node)?;
+                let nodes = self.nodes(pose.as_ref())?;
+                let bones = at.get("skin").map(|skin| self.bones(&skin, &nodes)).transpose()?;
+                (at.need("mesh")?.index()?, nodes[*node].weights.clone(), bones)
+            }
+        };
+        let mesh = root.nth("meshes", index)?;
+        let weights = match weights {
+            Some(weights) => weights,
+            None => mesh.list("weights")?.iter().map(|weight| Ok(weight.number()? as f32)).collect::<Result<_, _>>()?,
+        };
+        let posing = Posing { weights: &weights, bones: bones.as_deref() };
+        let mut data = MeshData::default();
+        for (i, primitive) in mesh.list("primitives")?.iter().enumerate() {
+            let name = match primitive.get("material") {
+                Some(material) => {
+                    let material = root.of_index("materials", &material)?;
+                    material.text_of("name").unwrap_or_default().to_owned()
+                }
+                None => String::new(),
+            };
+            data.materials.push(name);
+            self.add_primitive(&mut data, primitive, i as u32, &posing)?;
+        }
+        // All lists have to be as long as there are vertices
+        let vertices = data.positions.len();
+        if data.normals.iter().all(|normal| *normal == [0.0; 3]) {
+            data.normals.clear();
+        }
+        debug_assert!(data.uvs.iter().all(|set| set.len() == vertices));
+        if vertices as u64 > MAX_COUNT {
+            return Err(mesh.fault(format!("has {vertices} vertices, the limit is {MAX_COUNT}")));
+        }
+        Ok(data)
+    }
+
+    /// What the bones of a skin do to vertices, as the nodes stand.
+    fn bones(&self, skin: &JsonPlace<'_>, nodes: &[GltfNode]) -> Result<Vec<DAffine3>, GltfFault> {
+        let skin = self.root().of_index("skins", skin)?;
+        let inverse = skin.get("inverseBindMatrices").map(|at| self.vectors::<16>(&at)).transpose()?;
+        let mut bones = Vec::new();
+        for (i, joint) in skin.list("joints")?.iter().enumerate() {
+            let Some(node) = nodes.get(joint.index()?) else {
+                return Err(joint.fault(format!("there is no such node; there are {}", nodes.len())));
+            };
+            let bind = match &inverse {
+                None => DAffine3::IDENTITY,
+                Some(matrices) => match matrices.get(i) {
+                    Some(matrix) => {
+                        let matrix = DMat4::from_cols_array(&matrix.map(f64::from));
+                        DAffine3 { matrix3: DMat3::from_mat4(matrix), translation: matrix.w_axis.truncate() }
+                    }
+                    None => {
+                        return Err(joint.fault(format!("has no inverse bind matrix; there are {}", matrices.len())));
+                    }
+                },
+            };
+            bones.push(node.world * bind);
+        }
+        Ok(bones)
+    }
+
+    fn add_primitive(
+        &self,
+        data: &mut MeshData,
+        primitive: &JsonPlace<'_>,
+        number: u32,
+        posing: &Posing<'_>,
+    ) -> Result<(), GltfFault> {
+        let attributes = primitive.need("attributes")?;
+        let topology = match primitive.index_or("mode", 4)? {
+            4 => Topology::Triangles,
+            5 => Topology::Strip,
+            6 => Topology::Fan,
+            mode @ 0..=3 => {
+                let kind = if mode == 0 { "points" } else { "lines" };
+                data.notes.push(format!("{}: {kind} are left out; triangles are read", primitive.pointer()));
+                return Ok(());
+            }
+            other => return Err(primitive.fault(format!("{other} is no mode; they are 0 to 6"))),
+        };
+        let Some(position) = attributes.get("POSITION") else {
+            data.notes.push(format!("{}: has no POSITION and is left out", primitive.pointer()));
+            return Ok(());
+        };
+        let (mut positions, count) = (self.vectors::<3>(&position)?, self.count(&position)?);
+        let as_many = |at: &JsonPlace<'_>| match self.count(at)? {
+            n if n == count => Ok(()),
+            n => Err(at.fault(format!("has {n} elements for {count} positions"))),
+        };
+        let mut normals = match attributes.get("NORMAL") {
+            Some(normal) => as_many(&normal).and_then(|()| self.vectors::<3>(&normal))?,
+            None => Vec::new(),
+        };
+        // Morph targets
+        for (target, weight) in primitive.list("targets")?.iter().zip(posing.weights) {
+            if *weight == 0.0 {
+                continue;
+            }
+            for (key, vectors) in [("POSITION", &mut positions), ("NORMAL", &mut normals)] {
+                let Some(at) = target.get(key).filter(|_| !vectors.is_empty()) else { continue };
+                as_many(&at)?;
+                for (vector, moved) in vectors.iter_mut().zip(self.vectors::<3>(&at)?) {
+                    *vector = [0, 1, 2].map(|i| vector[i] + weight * moved[i]);
+                }
+            }
+        }
+        if let Some(bones) = posing.bones {
+            self.pose(&attributes, bones, &mut positions, &mut normals)?;
+        }
+        // Triangles, without those of vertices that there are not
+        let first = data.positions.len() as u32;
+        let indices = match primitive.get("indices") {
+            Some(at) => self.wholes::<1>(&at)?.into_flattened(),
+            None => {
+                self.take(&position, 4 * count as u64)?;
+                (0..count as u32).collect()
+            }
+        };
+        let mut left_out = 0;
+        let mut add = |corners: [u32; 3]| match corners.iter().all(|corner| (*corner as usize) < count) {
+            true => data.triangles.push(corners.map(|corner| first + corner)),
+            false => left_out += 1,
+        };
+        match topology {
+            Topology::Triangles => indices.as_chunks::<3>().0.iter().for_each(|corners| add(*corners)),
+            Topology::Strip => indices.windows(3).enumerate().for_each(|(i, w)| {
+                add(if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] });
+            }),
+            Topology::Fan => {
+                indices.iter().skip(1).zip(indices.iter().skip(2)).for_each(|(b, c)| add([*b, *c, indices[0]]));
+            }
+        }
+        if left_out > 0 {
+            let at = primitive.pointer();
+            data.notes.push(format!("{at}: {left_out} triangles of vertices that are not there are left out"));
+        }
+        data.face_materials.resize(data.triangles.len(), number);
+        // What only some primitives have is made up for the others
+        let colors = match attributes.get("COLOR_0") {
+            Some(color) => as_many(&color).and_then(|()| self.vectors::<4>(&color))?,
+            None => Vec::new(),
+        };
+        for set in 0..UV_SETS {
+            let Some(at) = attributes.get(&format!("TEXCOORD_{set}")) else { break };
+            as_many(&at)?;
+            if data.uvs.len() <= set {
+                data.uvs.push(vec![[0.0; 2]; first as usize]);
+            }
+            // Row 0 of a picture is v = 0 in glTF, and v = 1 here
+            data.uvs[set].extend(self.vectors::<2>(&at)?.iter().map(|[u, v]| [*u, 1.0 - v]));
+        }
+        data.positions.extend(positions);
+        let vertices = data.positions.len();
+        data.normals.extend(normals);
+        data.normals.resize(vertices, [0.0; 3]);
+        data.uvs.iter_mut().for_each(|set| set.resize(vertices, [0.0; 2]));
+        if !colors.is_empty() || !data.colors.is_empty() {
+            data.colors.resize(first as usize, [1.0; 4]);
+            data.colors.extend(colors);
+            data.colors.resize(vertices, [1.0; 4]);
+        }
+        Ok(())
+    }
+
+    /// Moves vertices by the bones, each by as much as its weight.
+    fn pose(
+        &self,
+        attributes: &JsonPlace<'_>,
+        bones: &[DAffine3],
+        positions: &mut [[f32; 3]],
+        normals: &mut [[f32; 3]],
+    ) -> Result<(), GltfFault> {
+        let mut sums = vec![(DAffine3::ZERO, 0.0f64); positions.len()];
+        for set in 0.. {
+            let names = [format!("JOINTS_{set}"), format!("WEIGHTS_{set}")];
+            let [Some(joints), Some(weights)] = names.each_ref().map(|name| attributes.get(name)) else { break };
+            let (joints, weights_of) = (self.wholes::<4>(&joints)?, self.vectors::<4>(&weights)?);
+            if joints.len() != positions.len() || weights_of.len() != positions.len() {
+                return Err(weights.fault(format!("joints and weights are not those of {} positions", positions.len())));
+            }
+            for (sum, (joints, weights_of)) in sums.iter_mut().zip(joints.iter().zip(&weights_of)) {
+                for (joint, weight) in joints.iter().zip(weights_of).filter(|(_, weight)| **weight != 0.0) {
+                    let Some(bone) = bones.get(*joint as usize) else {
+                        return Err(weights.fault(format!("there is no joint {joint}; the skin has {}", bones.len())));
+                    };
+                    let weight = f64::from(*weight);
+                    sum.0.matrix3 += bone.matrix3 * weight;
+                    sum.0.translation += bone.translation * weight;
+                    sum.1 += weight;
+                }
+            }
+        }
+        for (i, (moved, weight)) in sums.iter().enumerate() {
+            // Vertices without weights stay
+            if !(*weight > 0.0) {
+                continue;
+            }
+            // Weights need not make 1: those in bytes are rounded
+            let position = moved.transform_point3(DVec3::from(positions[i].map(f64::from))) / *weight;
+            positions[i] = position.as_vec3().to_array();
+            if let Some(normal) = normals.get_mut(i) {
+                let n = DVec3::from(normal.map(f64::from));
+                // The inverse transpose, but for its length: that of the cofactors
+                let [x, y, z] = [moved.matrix3.x_axis, moved.matrix3.y_axis, moved.matrix3.z_axis];
+                let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
+                let side = if moved.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
+                *normal = (cofactors * n * side).normalize_or_zero().as_vec3().to_array();
+            }
+        }
+        Ok(())
+    }
+}

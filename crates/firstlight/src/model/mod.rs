@@ -1,0 +1,86 @@
+//! Model files as descriptions: the shapes, materials, textures, lights and cameras that a scene could have said itself.
+//!
+//! The station before is `import`, which reads bytes; the station after is the description of a scene, in which a
+//! `[[model]]` is replaced by what is here. Nothing here is compiled: what comes of a file can be written as text and
+//! read again.
+
+mod gltf;
+mod mesh;
+
+pub(crate) use gltf::{ShownModel, describe as describe_gltf};
+pub(crate) use mesh::{describe_mesh, describe_points};
+
+use crate::camera::CameraDesc;
+use crate::describe::{ColorParam, NumberParam};
+use crate::light::LightDesc;
+use crate::material::{MaterialCommonDesc, MaterialDesc, MetallicRoughnessDesc, UnlitDesc};
+use crate::math::DAffine3;
+use crate::shape::{GroupDesc, ShapeDesc};
+use crate::texture::TextureDesc;
+
+/// What a model file describes. Materials, textures and groups have names that begin with that of the file.
+#[derive(Debug, Default)]
+pub(crate) struct ModelParts {
+    pub textures: Vec<(String, TextureDesc)>,
+    pub materials: Vec<(String, MaterialDesc)>,
+    /// Meshes that several nodes show.
+    pub groups: Vec<(String, GroupDesc)>,
+    pub shapes: Vec<ModelShape>,
+    pub lights: Vec<LightDesc>,
+    pub cameras: Vec<(String, CameraDesc)>,
+    /// What was put up with.
+    pub warnings: Vec<ModelWarning>,
+}
+
+/// A shape of a model and where it stands in the space of the file.
+#[derive(Debug)]
+pub(crate) struct ModelShape {
+    pub shape: ShapeDesc,
+    pub model_from_shape: DAffine3,
+}
+
+/// Something that is odd about a file.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ModelWarning {
+    pub message: String,
+    pub hint: String,
+}
+
+/// `name`, or with a number behind it if it is taken.
+pub(crate) fn unique(name: String, taken: impl Fn(&str) -> bool) -> String {
+    if !taken(&name) {
+        return name;
+    }
+    (2..).map(|number| format!("{name} {number}")).find(|name| !taken(name)).expect("numbers do not end")
+}
+
+/// The material that shows the colour of another one, whatever light there is.
+fn unlit(material: MaterialDesc) -> MaterialDesc {
+    let (color, common) = match material {
+        MaterialDesc::MetallicRoughness(desc) => (desc.base_color, desc.common),
+        MaterialDesc::Phong(desc) => (desc.diffuse, desc.common),
+        MaterialDesc::BlinnPhong(desc) => (desc.diffuse, desc.common),
+        other => return other,
+    };
+    let common = MaterialCommonDesc { normal_map: None, bump_map: NumberParam::constant(0.0), ..common };
+    MaterialDesc::Unlit(UnlitDesc { color, common })
+}
+
+/// The material, or its colour alone.
+fn shown(material: MaterialDesc, is_unlit: bool) -> MaterialDesc {
+    if is_unlit { unlit(material) } else { material }
+}
+
+/// What the scene calls a material of a file.
+fn material_name(file: &str, own: &str, is_unlit: bool) -> String {
+    format!("{file}/{own}{}", if is_unlit { " unlit" } else { "" })
+}
+
+/// The gray of models that say no material: that of clay.
+const CLAY: [f64; 3] = [0.66, 0.64, 0.61];
+
+/// The material of models that say none: matte, of a warm light gray; white where vertices have colours.
+pub(crate) fn clay(has_colors: bool) -> MaterialDesc {
+    let base_color = if has_colors { ColorParam::gray(1.0) } else { CLAY.into() };
+    MaterialDesc::MetallicRoughness(MetallicRoughnessDesc { base_color, ..MetallicRoughnessDesc::default() })
+}

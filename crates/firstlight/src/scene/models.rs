@@ -1,0 +1,301 @@
+//! Models within a scene: each `[[model]]` is replaced by what its file describes, at a moment.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+
+use super::SceneDesc;
+use crate::context::{Assets, CompileContext};
+use crate::describe::node::quoted;
+use crate::import::{MeshFormat, OpenFault, is_gltf, is_point_set};
+use crate::math::{DAffine3, DMat3, DVec3};
+use crate::model::{ModelParts, ShownModel, describe_gltf, describe_mesh, describe_points, unique};
+use crate::shape::{GroupDesc, MeshFiles, ModelDesc, ShapeDesc, UpAxis, load_mesh_file, read_mesh_bytes, unreadable};
+use crate::transform::TransformDesc;
+
+/// What kind of model a file is.
+enum ModelKind {
+    Gltf,
+    Mesh(MeshFormat),
+    Points,
+}
+
+impl SceneDesc {
+    /// The description with the parts of its models in place of them, at the moment of `cx`; as it is without models.
+    /// What is wrong with their files is said at `model[i]`.
+    pub(super) fn with_models(
+        &self,
+        cx: &mut CompileContext,
+        assets: &dyn Assets,
+        files: &mut MeshFiles<'_>,
+    ) -> Cow<'_, SceneDesc> {
+        let grouped = self.groups.iter().flat_map(|(_, group)| &group.shapes);
+        if !self.shapes.iter().chain(grouped).any(|shape| matches!(shape, ShapeDesc::Model(_))) {
+            return Cow::Borrowed(self);
+        }
+        let mut desc = self.clone();
+        let shapes = std::mem::take(&mut desc.shapes);
+        desc.shapes = desc.replace_models(cx, assets, files, "", shapes);
+        for i in 0..desc.groups.len() {
+            let shapes = std::mem::take(&mut desc.groups[i].1.shapes);
+            let prefix = format!("group.{}.", desc.groups[i].0);
+            desc.groups[i].1.shapes = desc.replace_models(cx, assets, files, &prefix, shapes);
+        }
+        Cow::Owned(desc)
+    }
+
+    /// The shapes of the scene, or of a group, with the parts of models in place of them. All else that models bring
+    /// is added to the description.
+    fn replace_models(
+        &mut self,
+        cx: &mut CompileContext,
+        assets: &dyn Assets,
+        files: &mut MeshFiles<'_>,
+        prefix: &str,
+        shapes: Vec<ShapeDesc>,
+    ) -> Vec<ShapeDesc> {
+        let mut all = Vec::with_capacity(shapes.len());
+        let mut number = 0;
+        for shape in shapes {
+            let ShapeDesc::Model(model) = shape else {
+                all.push(shape);
+                continue;
+            };
+            cx.within(&format!("{prefix}model[{number}]"), |cx| {
+                let parts = model.parts(cx, assets, files);
+                let placed = TransformDesc::compile_field(model.transform.as_deref(), cx);
+                if let Some((parts, up)) = parts {
+                    let world_from_model = placed.unwrap_or(DAffine3::IDENTITY) * up;
+                    self.add_parts(&model, parts, world_from_model, &mut all, prefix.is_empty());
+                }
+            });
+            number += 1;
+        }
+        all
+    }
+
+    fn add_parts(
+        &mut self,
+        model: &ModelDesc,
+        parts: ModelParts,
+        world_from_model: DAffine3,
+        shapes: &mut Vec<ShapeDesc>,
+        is_scene: bool,
+    ) {
+        // A file that several models show brings the same names again
+        add_new(&mut self.textures, parts.textures);
+        add_new(&mut self.materials, parts.materials);
+        // Those of another variant hold other materials
+        let mut renamed: HashMap<String, String> = HashMap::new();
+        for (name, group) in parts.groups {
+            let same = |(other, content): &(String, GroupDesc)| other.starts_with(&name) && *content == group;
+            let of = self.groups.iter().find(|other| same(other)).map(|(other, _)| other.clone());
+            let of = of.unwrap_or_else(|| {
+                let taken = |name: &str| self.groups.iter().any(|(other, _)| other == name);
+                let of = unique(name.clone(), taken);
+                self.groups.push((of.clone(), group));
+                of
+            });
+            renamed.insert(name, of);
+        }
+        for part in parts.shapes {
+            let mut shape = part.shape;
+            if let ShapeDesc::Instance(instance) = &mut shape
+                && let Some(of) = renamed.get(&instance.of)
+            {
+                instance.of.clone_from(of);
+            }
+            model.overlay(&mut shape, world_from_model * part.model_from_shape);
+            shapes.push(shape);
+        }
+        if model.lights && is_scene {
+            for mut light in parts.lights {
+                let transform = transform_of(&world_from_model);
+                light.set_transform(transform);
+                light.set_name(model.named(light.name().as_deref()));
+                self.lights.push(light);
+            }
+            self.lights.sort_by_key(crate::describe::Family::kind_index);
+        }
+        if model.cameras && is_scene {
+            for (name, mut camera) in parts.cameras {
+                camera.transform = transform_of(&world_from_model);
+                let taken = |name: &str| self.cameras.iter().any(|(other, _)| other == name);
+                if !taken(&name) {
+                    self.cameras.push((name, camera));
+                }
+            }
+        }
+    }
+}
+
+/// Adds what has a name that is not there yet.
+fn add_new<T>(list: &mut Vec<(String, T)>, more: Vec<(String, T)>) {
+    let known: std::collections::HashSet<String> = list.iter().map(|(name, _)| name.clone()).collect();
+    list.extend(more.into_iter().filter(|(name, _)| !known.contains(name)));
+}
+
+/// The transform, as a description says it.
+fn transform_of(affine: &DAffine3) -> Option<Box<TransformDesc>> {
+    if *affine == DAffine3::IDENTITY {
+        return None;
+    }
+    let [x, y, z] = [0, 1, 2].map(|row| affine.matrix3.row(row));
+    let t = affine.translation;
+    let matrix = Some([x.x, x.y, x.z, t.x, y.x, y.y, y.z, t.y, z.x, z.y, z.z, t.z]);
+    Some(Box::new(TransformDesc { matrix, ..TransformDesc::default() }))
+}
+
+impl ModelDesc {
+    /// What the file describes, and the way from its axes to those of scenes. `None` after an error.
+    fn parts(
+        &self,
+        cx: &mut CompileContext,
+        assets: &dyn Assets,
+        files: &mut MeshFiles<'_>,
+    ) -> Option<(ModelParts, DAffine3)> {
+        let (kind, file) = (self.kind(cx, assets, files)?, self.file.0.as_str());
+        self.refuse_fields(cx, matches!(kind, ModelKind::Gltf));
+        let chosen = |name: &str| self.materials.get(name).map(str::to_owned);
+        let up = match kind {
+            ModelKind::Mesh(MeshFormat::Stl) => UpAxis::Z,
+            _ => UpAxis::Y,
+        };
+        let (parts, names) = match kind {
+            ModelKind::Points => (describe_points(file, self.unlit), Vec::new()),
+            ModelKind::Mesh(_) => {
+                let (data, _) = load_mesh_file(cx, assets, &self.file, files)?;
+                let names = data.materials.clone();
+                (describe_mesh(file, &data, (self.smooth_deg, self.unlit), &chosen), names)
+            }
+            ModelKind::Gltf => {
+                let gltf = match files.open.gltf.open(file, assets) {
+                    Ok(gltf) => gltf,
+                    Err(OpenFault::Read(error)) => {
+                        unreadable(cx, &self.file, &error);
+                        return None;
+                    }
+                    Err(OpenFault::Damaged(error)) => {
+                        cx.error("file", error.to_string(), None);
+                        return None;
+                    }
+                };
+                // An animation without a moment of its own plays with the scene
+                let plays = self.animation.is_some() && self.time.is_none();
+                cx.keyed |= plays;
+                let shown = ShownModel {
+                    file,
+                    variant: self.variant.as_deref(),
+                    scene: self.scene.map(|scene| scene as usize),
+                    animation: self.animation.as_deref(),
+                    time: if plays { Some(cx.time) } else { self.time },
+                    chosen: &chosen,
+                    unlit: self.unlit,
+                };
+                match describe_gltf(&gltf, &shown) {
+                    Ok(parts) => (parts, gltf.material_names()),
+                    Err(fault) => {
+                        cx.error("file", fault.into_error(file).to_string(), None);
+                        return None;
+                    }
+                }
+            }
+        };
+        for (name, _) in &self.materials.0 {
+            if !names.contains(name) {
+                let names: Vec<&str> = names.iter().map(String::as_str).collect();
+                cx.unknown("materials", "material of the file", name, &names);
+            }
+        }
+        for warning in &parts.warnings {
+            cx.warning("file", format!("{}: {}", quoted(file), warning.message), Some(&warning.hint));
+        }
+        let turned = DAffine3 { matrix3: DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y), translation: DVec3::ZERO };
+        let up = if self.up.unwrap_or(up) == UpAxis::Z { turned } else { DAffine3::IDENTITY };
+        Some((parts, up))
+    }
+
+    /// What kind of file it is: by its ending, else by its content. `None` after an error.
+    fn kind(&self, cx: &mut CompileContext, assets: &dyn Assets, files: &mut MeshFiles<'_>) -> Option<ModelKind> {
+        let file = &self.file.0;
+        let ending = file.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase());
+        match ending.as_deref() {
+            Some("gltf" | "glb") => return Some(ModelKind::Gltf),
+            Some("obj") => return Some(ModelKind::Mesh(MeshFormat::Obj)),
+            Some("stl") => return Some(ModelKind::Mesh(MeshFormat::Stl)),
+            _ => {}
+        }
+        let (bytes, _) = read_mesh_bytes(cx, assets, &self.file, files)?;
+        if is_gltf(&bytes) {
+            Some(ModelKind::Gltf)
+        } else if is_point_set(&bytes[..bytes.len().min(HEAD)]) {
+            Some(ModelKind::Points)
+        } else {
+            // What is none of them is refused where it is read
+            Some(ModelKind::Mesh(MeshFormat::detect(file, &bytes).unwrap_or(MeshFormat::Ply)))
+        }
+    }
+
+    /// Refuses fields that files of the other kinds have no use for.
+    fn refuse_fields(&self, cx: &mut CompileContext, is_gltf: bool) {
+        if let Some(time) = self.time {
+            cx.between("time", time, -1e9, 1e9, Some("in seconds"));
+        }
+        let of_gltf = [
+            ("variant", self.variant.is_some()),
+            ("scene", self.scene.is_some()),
+            ("animation", self.animation.is_some()),
+            ("time", self.time.is_some()),
+            ("lights", self.lights),
+            ("cameras", self.cameras),
+        ];
+        let others = [("smooth_deg", self.smooth_deg.is_some())];
+        let wrong = if is_gltf { &others[..] } else { &of_gltf[..] };
+        for (field, _) in wrong.iter().filter(|(_, said)| *said) {
+            let message = if is_gltf { "it is for files that are no glTF" } else { "it is for glTF files" };
+            cx.error(field, message, Some("leave it out"));
+        }
+    }
+
+    /// The name of a part.
+    fn named(&self, part: Option<&str>) -> Option<String> {
+        match (self.name.as_deref(), part) {
+            (Some(model), Some(part)) => Some(format!("{model}/{part}")),
+            (model, part) => model.or(part).map(str::to_owned),
+        }
+    }
+
+    /// Says of a part what the model says of all of them.
+    fn overlay(&self, part: &mut ShapeDesc, world_from_shape: DAffine3) {
+        macro_rules! overlay {
+            ($desc:expr) => {{
+                $desc.name = self.named($desc.name.as_deref());
+                $desc.transform = transform_of(&world_from_shape);
+                $desc.visible &= self.visible;
+                $desc.casts_shadow &= self.casts_shadow;
+                $desc.receives_shadow &= self.receives_shadow;
+                $desc.single_sided |= self.single_sided;
+                $desc.lights_include.clone_from(&self.lights_include);
+                $desc.lights_exclude.clone_from(&self.lights_exclude);
+                $desc.shadow_include.clone_from(&self.shadow_include);
+                $desc.shadow_exclude.clone_from(&self.shadow_exclude);
+                if self.material.is_some() {
+                    $desc.material.clone_from(&self.material);
+                }
+            }};
+        }
+        match part {
+            ShapeDesc::Mesh(mesh) => {
+                overlay!(mesh);
+                if let Some(material) = &self.material {
+                    mesh.materials.iter_mut().for_each(|own| own.clone_from(material));
+                }
+            }
+            ShapeDesc::PointSet(points) => overlay!(points),
+            ShapeDesc::Instance(instance) => overlay!(instance),
+            _ => {}
+        }
+    }
+}
+
+/// Bytes that tell what a file is.
+const HEAD: usize = 1 << 16;
