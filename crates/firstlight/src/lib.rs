@@ -94,14 +94,16 @@ pub use image::{
     StagedFile, StoredImage, StoredPlane, StoredPlanes, Window, Written, display_bytes, display_steps, encode_planes,
     false_colors, is_decoding, relative_differences, write_open, write_whole,
 };
-pub use import::{ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, is_point_set, read_mesh};
+pub use import::{
+    ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, MtlNote, is_point_set, read_mesh,
+};
 pub use light::{
     DirectionalDesc, DiskLightDesc, EmitSides, Falloff, LightDesc, PointDesc, RectangleDesc, SampleSet,
     SphereLightDesc, SpotDesc,
 };
 pub use material::{
     AlphaMode, AmbientDesc, AmbientGradientDesc, BlinnPhongDesc, MaterialCommonDesc, MaterialDesc,
-    MetallicRoughnessDesc, NormalFix, PhongDesc, UnlitDesc,
+    MetallicRoughnessDesc, MtlMaterials, MtlSettings, NormalFix, PhongDesc, UnlitDesc, read_mtl,
 };
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
 pub use render::{LightCounts, RenderStats, render, render_image};

@@ -16,6 +16,7 @@
 mod error;
 mod foreign;
 mod given;
+pub(crate) mod mtl;
 mod obj;
 mod ply;
 mod polygon;
@@ -35,6 +36,7 @@ use error::ImportFault;
 pub use error::{ImportError, MeshPlace};
 pub(crate) use foreign::{WantedFile, foreign};
 pub(crate) use given::from_own_origin;
+pub use mtl::MtlNote;
 pub use report::MeshReport;
 pub(crate) use tidy::used_vertices;
 

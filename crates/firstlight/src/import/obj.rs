@@ -22,7 +22,7 @@ use std::sync::Mutex;
 
 use super::error::{WRITE_ANEW, shown};
 use super::polygon::{self, PolygonCounts, triangles_of};
-use super::text::{Cursor, pieces};
+use super::text::{Cursor, decoded, pieces};
 use super::weld::weld;
 use super::{ImportFault, MAX_COUNT, MeshData, MeshPart, Progress, all};
 use crate::parallel::{self, CHUNK};
@@ -296,7 +296,7 @@ fn statements(parts: &[Piece], mesh: &mut MeshData) {
 }
 
 fn text_of(name: &[u8]) -> String {
-    String::from_utf8_lossy(name).into_owned()
+    decoded(name).0
 }
 
 /// Materials, groups and smoothing of the triangles.
