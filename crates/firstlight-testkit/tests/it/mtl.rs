@@ -29,7 +29,7 @@ fn files_of_others_are_read() {
         ("cube.mtl", [5, 0, 1]),
         ("cornell_box.mtl", [5, 0, 1]),
         ("pbr-mat-ext.mtl", [1, 4, 4]),
-        ("texture-options-issue-85.mtl", [3, 15, 11]),
+        ("texture-options-issue-85.mtl", [3, 11, 8]),
         ("box-textured/box-textured.mtl", [1, 1, 0]),
         ("box-negative-indices/box-negative-indices.mtl", [1, 0, 0]),
         ("box-objects-groups-materials/box-objects-groups-materials.mtl", [3, 0, 0]),

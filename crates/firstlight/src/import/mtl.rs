@@ -665,7 +665,8 @@ impl Reader<'_> {
 
     fn unused_option(&mut self, option: &str, why: &str) {
         let message = format!("the option {} of a picture is not used", shown(option.as_bytes()));
-        self.notes.add(&format!("option {option}"), self.line, message, why);
+        let kind = option.split(' ').next().unwrap_or_default();
+        self.notes.add(&format!("option {kind}"), self.line, message, why);
     }
 
     /// The path of a picture as it is written: relative to the MTL file, with `/` between folders.
