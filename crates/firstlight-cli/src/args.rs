@@ -282,7 +282,7 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub reading: ReadingArgs,
 
-    /// A picture to write: its ending, .png, .exr, .npz, .npy or .hdr, says the format; - is standard output. With
+    /// A picture to write: its ending, .png, .jpg, .exr, .npz, .npy or .hdr, says the format; - is standard output. With
     /// NAME= before it, one buffer by itself, as in depth=depth.png (`firstlight buffers` lists them all), rendered
     /// whatever --buffers says; a file whose own name has a = is written as ./a=b.png. {stem} in it is the scene's file
     /// name without its ending, {name} the whole of it; with several scenes one of them is needed, in --heat and
@@ -308,6 +308,10 @@ pub struct RenderArgs {
     /// The format of -o - and of names without an ending, such as /dev/null [default: png for -]
     #[arg(long, value_name = "FORMAT", help_heading = "Output")]
     pub format: Option<NamedFormat>,
+    /// The quality of JPEG files, 1 to 100: the more, the longer they are and the less is lost. They have no alpha: what
+    /// lets light through lies on black [default: 90]
+    #[arg(long, value_name = "N", value_parser = quality, help_heading = "Output")]
+    pub quality: Option<u8>,
     /// Units per metre of depth and distance in PNG files, 0.001 to 1000000: 1000 are millimetres, as in ScanNet and
     /// BOP; the data sets of TUM have 5000. 0 is where nothing is, and where something is farther than 65535 units:
     /// that is a warning, and an error under --strict [default: 1000]
@@ -432,7 +436,7 @@ pub struct RenderArgs {
     /// there [default: renders]
     #[arg(long, value_name = "FILE.toml", require_equals = true, help_heading = "Output")]
     #[arg(value_hint = ValueHint::FilePath)]
-    #[arg(conflicts_with_all = ["output", "bits", "format", "depth_scale", "half", "exposure", "crop"])]
+    #[arg(conflicts_with_all = ["output", "bits", "format", "quality", "depth_scale", "half", "exposure", "crop"])]
     #[arg(conflicts_with_all = ["time", "frames", "shard", "aa_mode", "reference", "visibility"])]
     #[arg(conflicts_with_all = ["threads", "tile_size", "simd", "stats", "coco", "heat"])]
     pub print_scene: Option<Option<PathBuf>>,
@@ -473,7 +477,7 @@ pub struct InfoArgs {
 /// `firstlight diff`
 #[derive(Args, Debug)]
 pub struct DiffArgs {
-    /// A picture: .png, .exr, .npz or .hdr; of FLIP the reference
+    /// A picture: .png, .jpg, .exr, .npz or .hdr; of FLIP the reference
     #[arg(value_name = "A", value_hint = ValueHint::FilePath)]
     pub a: PathBuf,
     /// Another, of the same size. Of a PNG file and one of linear light the picture is compared in the bits of the PNG
@@ -523,7 +527,7 @@ Examples:
 /// `firstlight view-buffer`
 #[derive(Args, Debug)]
 pub struct ViewBufferArgs {
-    /// A file with buffers: .exr, .npz, .npy, .png or .hdr
+    /// A file with buffers: .exr, .npz, .npy, .png, .jpg or .hdr
     #[arg(value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
     /// The buffer to look at, as `firstlight buffers` lists them; of another program's .npy file what its array is
@@ -548,7 +552,7 @@ pub struct ViewBufferArgs {
 /// `firstlight verify`
 #[derive(Args, Debug)]
 pub struct VerifyArgs {
-    /// A picture that firstlight wrote: .png, .exr, .npz, .npy or .hdr
+    /// A picture that firstlight wrote: .png, .jpg, .exr, .npz, .npy or .hdr
     #[arg(value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
     /// Its scene, or a folder that has it among its scenes and models; which one it is, the hash tells [default: a
@@ -578,12 +582,15 @@ pub struct RelightArgs {
     /// order. May be given several times, in effect in that order
     #[arg(long, value_name = "NAME=CHANGE", value_parser = crate::relight::change, required = true)]
     pub light: Vec<(String, LightChange)>,
-    /// A picture to write: its ending, .png, .exr, .npz, .npy or .hdr, says the format. May be given several times
+    /// A picture to write: its ending, .png, .jpg, .exr, .npz, .npy or .hdr, says the format. May be given several times
     #[arg(short, long = "output", value_name = "FILE", value_hint = ValueHint::FilePath, required = true)]
     pub output: Vec<PathBuf>,
     /// Bits in each channel of PNG files [default: 8]
     #[arg(long, value_name = "8|16")]
     pub bits: Option<Bits>,
+    /// The quality of JPEG files, 1 to 100 [default: 90]
+    #[arg(long, value_name = "N", value_parser = quality)]
+    pub quality: Option<u8>,
     /// Stops of exposure of 8- and 16-bit pictures, -64 to 64 [default: the scene's]
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
     pub exposure: Option<f64>,
@@ -631,6 +638,9 @@ pub enum NamedFormat {
     Npy,
     /// The film itself, in Radiance's shared exponents
     Hdr,
+    /// 8 bits with losses, display-encoded
+    #[value(alias = "jpg")]
+    Jpeg,
 }
 
 #[cfg(test)]

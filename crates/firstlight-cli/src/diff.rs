@@ -85,10 +85,11 @@ impl Pair {
             )));
         }
         // What is of 8 or 16 bits cannot be undone: the other becomes it
-        let is_shown = |file: &StoredPlanes| matches!(file.format, Format::Png8 | Format::Png16);
+        let is_shown = |file: &StoredPlanes| file.format.is_display_encoded();
         let both_linear = !is_shown(&a) && !is_shown(&b);
         if args.exposure.is_some() && !both_linear {
-            let message = "--exposure is for two pictures of linear light, .exr, .npz or .hdr; a PNG file has its own";
+            let message =
+                "--exposure is for two pictures of linear light, .exr, .npz or .hdr; PNG and JPEG files have their own";
             return Err(Failure::Usage(message.into()));
         }
         let displays = match (is_shown(&a), is_shown(&b)) {

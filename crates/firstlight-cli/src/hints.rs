@@ -32,7 +32,7 @@ const OPTIONS: &[(&[&str], &str)] = &[
     ),
     (
         &["--render-format", "--output-format", "--file-format", "-F"],
-        "the ending of -o FILE says the format: .png, .exr or .hdr",
+        "the ending of -o FILE says the format: .png, .jpg, .exr or .hdr",
     ),
     (&["--fps", "--frame-rate", "--framerate"], "the scene says it, as fps in [render]; --frames A..B renders frames"),
     (

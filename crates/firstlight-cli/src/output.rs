@@ -424,7 +424,7 @@ pub fn resolve(paths: &[PathBuf], bits: Option<Bits>, format: Option<NamedFormat
             (Target::File(path), _) => match Format::from_path(path) {
                 Ok(kind) => kind,
                 Err(e) if path.extension().is_none() => {
-                    return usage(format!("{e}, or say the format with --format png, exr, npz, npy or hdr"));
+                    return usage(format!("{e}, or say the format with --format png, jpeg, exr, npz, npy or hdr"));
                 }
                 Err(e) => return usage(e.to_string()),
             },
@@ -598,6 +598,7 @@ fn format_of(format: NamedFormat) -> Format {
         NamedFormat::Npz => Format::Npz,
         NamedFormat::Npy => Format::Npy,
         NamedFormat::Hdr => Format::Hdr,
+        NamedFormat::Jpeg => Format::Jpeg,
     }
 }
 

@@ -1,6 +1,8 @@
 //! `firstlight relight`: a picture with other lights, without a render.
 
-use firstlight::{Display, FileSettings, Format, LightChange, Relit, relight};
+use firstlight::{
+    Display, FileSettings, Format, LightChange, NamedPlane, Plane, PlaneNumbers, Relit, encode_planes, relight,
+};
 
 use crate::args::RelightArgs;
 use crate::difference;
@@ -24,7 +26,11 @@ pub fn run(args: &RelightArgs) -> Result<(), Failure> {
     }
     let display = Display { exposure: args.exposure.unwrap_or(display.exposure), ..display };
     let watch = Watch::begin();
-    let encode = |(_, format): &(Target, Format)| image.encode(*format, &display, &receipt);
+    let default = FileSettings::default();
+    let files = FileSettings { display, jpeg_quality: args.quality.unwrap_or(default.jpeg_quality), ..default };
+    let planes = [NamedPlane::new(Plane::Color, PlaneNumbers::Floats(image.pixels.as_flattened()))];
+    let encode =
+        |(_, format): &(Target, Format)| encode_planes(image.film, image.window, &planes, *format, &files, &receipt);
     let encoded =
         outputs.iter().map(encode).collect::<Result<Vec<_>, _>>().map_err(|e| Failure::Work(e.to_string()))?;
     let staged = ready.into_iter().zip(&encoded).map(|(ready, bytes)| ready.stage(bytes));
@@ -48,11 +54,14 @@ fn outputs(args: &RelightArgs) -> Result<Vec<(Target, Format)>, Failure> {
         }
         outputs.push((target, with_bits(format, args.bits)));
     }
-    let is_png = |(_, format): &(Target, Format)| matches!(format, Format::Png8 | Format::Png16);
-    if !outputs.iter().any(is_png) {
-        let unused = [("--bits", args.bits.is_some()), ("--exposure", args.exposure.is_some())];
-        if let Some((option, _)) = unused.into_iter().find(|(_, given)| *given) {
-            return Err(Failure::Usage(format!("{option} is for PNG only, and no output is one")));
+    let any = |is: &dyn Fn(Format) -> bool| outputs.iter().any(|(_, format)| is(*format));
+    for (option, is_given, kinds, is_used) in [
+        ("--bits", args.bits.is_some(), "PNG", any(&|format| matches!(format, Format::Png8 | Format::Png16))),
+        ("--exposure", args.exposure.is_some(), "PNG and JPEG", any(&Format::is_display_encoded)),
+        ("--quality", args.quality.is_some(), "JPEG", any(&|format| format == Format::Jpeg)),
+    ] {
+        if is_given && !is_used {
+            return Err(Failure::Usage(format!("{option} is for {kinds} only, and no output is one")));
         }
     }
     Ok(outputs)

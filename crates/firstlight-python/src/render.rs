@@ -411,7 +411,7 @@ impl PyRender {
     /// Parameters
     /// ----------
     /// path : path-like
-    ///     The ending says the format: .png (8 bits), .exr, .npz, .npy or .hdr.
+    ///     The ending says the format: .png (8 bits), .jpg, .exr, .npz, .npy or .hdr.
     /// buffer : str, optional
     ///     The buffer to write by itself; else all that the format holds, or the picture. In a .png file depth,
     ///     distance and ids have 16 bits, and 0 where nothing is; colours are shown as the picture is; normals are
@@ -422,7 +422,9 @@ impl PyRender {
     /// half : bool
     ///     Whether an .exr file holds colours and shares of the pixel in 16-bit floats, which end at 65504. Depth,
     ///     positions, normals and all else keep their 32 bits.
-    #[pyo3(signature = (path, *, buffer = None, depth_scale = None, half = false))]
+    /// quality : int
+    ///     Of a .jpg file, 1 to 100: 90, if not given. Such a file has no alpha: what lets light through lies on black.
+    #[pyo3(signature = (path, *, buffer = None, depth_scale = None, half = false, quality = None))]
     fn save(
         &self,
         py: Python<'_>,
@@ -430,10 +432,14 @@ impl PyRender {
         buffer: Option<&str>,
         depth_scale: Option<f64>,
         half: bool,
+        quality: Option<u8>,
     ) -> PyResult<()> {
         let format = Format::from_path(&path).map_err(|e| image_error(&e))?;
         if half && format != Format::Exr {
             return Err(PyValueError::new_err(format!("half is for .exr files, and {} is none", path.display())));
+        }
+        if quality.is_some() && format != Format::Jpeg {
+            return Err(PyValueError::new_err(format!("quality is for .jpg files, and {} is none", path.display())));
         }
         let is_scaled = format == Format::Png8 && buffer.is_some_and(|name| self.is_distance(name));
         if depth_scale.is_some() && !is_scaled {
@@ -445,7 +451,8 @@ impl PyRender {
         }
         let default = FileSettings::default();
         let depth_scale = depth_scale.unwrap_or(default.depth_scale);
-        let settings = FileSettings { depth_scale, half, ..default };
+        let jpeg_quality = quality.unwrap_or(default.jpeg_quality);
+        let settings = FileSettings { depth_scale, half, jpeg_quality, ..default };
         let bytes = self.encode(py, format, buffer, settings)?;
         // Not at work: it takes no locks, and may wait for a reader that is yet to be forked
         py.detach(|| write_whole(&path, &bytes)).map(drop).map_err(|e| image_error(&e))

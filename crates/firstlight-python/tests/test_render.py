@@ -55,8 +55,11 @@ def test_each_light_is_an_array(tmp_path):
 
 def test_files_hold_what_the_arrays_hold(tmp_path):
     frame = fl.builtin("config11").render(buffers=["color", "depth", "object-id"], **SMALL)
-    for name in ("a.exr", "a.npz", "a.png", "a.hdr"):
+    for name in ("a.exr", "a.npz", "a.png", "a.hdr", "a.jpg"):
         frame.save(tmp_path / name)
+    usual = (tmp_path / "a.jpg").read_bytes()
+    frame.save(tmp_path / "a.jpg", quality=40)
+    assert usual.startswith(b"\xff\xd8\xff") and len((tmp_path / "a.jpg").read_bytes()) < len(usual)
     with np.load(tmp_path / "a.npz") as stored:
         assert all((stored[name] == frame[name]).all() for name in frame)
         assert json.loads(str(stored["receipt"]))["scene_hash"] == frame.receipt["scene_hash"]
@@ -64,11 +67,15 @@ def test_files_hold_what_the_arrays_hold(tmp_path):
         assert (stored.channels()["depth.Z"].pixels == frame["depth"]).all()
     assert frame.to_png().startswith(b"\x89PNG") and frame._repr_png_() == frame.to_png()
     assert len(frame.to_png(bits=16)) > len(frame.to_png())
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.exr", "a.hdr", "a.npz", "a.png"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.exr", "a.hdr", "a.jpg", "a.npz", "a.png"]
     with pytest.raises(OSError, match="no folder"):
         frame.save(tmp_path / "none" / "a.png")
     with pytest.raises(ValueError, match="not the ending"):
-        frame.save(tmp_path / "a.jpg")
+        frame.save(tmp_path / "a.gif")
+    with pytest.raises(ValueError, match="quality is for"):
+        frame.save(tmp_path / "a.png", quality=40)
+    with pytest.raises(ValueError, match="the quality is 0"):
+        frame.save(tmp_path / "a.jpg", quality=0)
     with pytest.raises(ValueError, match="not color"):
         fl.builtin("config11").render(buffers=["depth"], **SMALL).to_png()
 

@@ -96,7 +96,7 @@ pub use image::{
     false_colors, is_decoding, relative_differences, write_open, write_whole,
 };
 pub use import::{
-    ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, is_gltf, is_point_set, read_mesh,
+    ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, MtlNote, is_gltf, is_point_set, read_mesh,
 };
 pub use light::{
     DirectionalDesc, DiskLightDesc, EmitSides, Falloff, LightDesc, PointDesc, RectangleDesc, SampleSet,
@@ -107,6 +107,7 @@ pub use material::{
     MetallicRoughnessDesc, NormalFix, PhongDesc, UnlitDesc,
 };
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
+pub use model::{MtlMaterials, MtlSettings, read_mtl};
 pub use render::{LightCounts, RenderStats, render, render_image};
 pub use scene::{
     Added, CameraHit, CastHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, MotionTo, RenderDesc, Scene,

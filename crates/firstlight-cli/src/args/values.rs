@@ -69,6 +69,12 @@ pub(super) fn depth_scale(text: &str) -> Result<f64, String> {
     number(text, 1e-3..=1e6, "a number of units per metre from 0.001 to 1000000 is needed; 1000 are millimetres")
 }
 
+/// Reads the quality of JPEG files.
+pub(super) fn quality(text: &str) -> Result<u8, String> {
+    let quality = text.parse().ok().filter(|quality| (1..=100).contains(quality));
+    quality.ok_or_else(|| "a whole number from 1 to 100 is needed; 90 loses little that can be seen".into())
+}
+
 /// Reads a tolerance in display steps.
 pub(super) fn tolerance(text: &str) -> Result<f64, String> {
     number(text, 0.25..=16.0, "a number of display steps from 0.25 to 16 is needed")

@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 use crate::report::{Failure, answer, shown};
 
 /// First bytes of picture files that may have a receipt, NPZ files apart, which are zip archives.
-const MAGIC: [&[u8]; 4] = [b"\x89PNG\r\n\x1a\n", b"\x76\x2f\x31\x01", b"#?RADIANCE\n", b"\x93NUMPY"];
+const MAGIC: [&[u8]; 5] = [b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\x76\x2f\x31\x01", b"#?RADIANCE\n", b"\x93NUMPY"];
 
 /// Whether `path` is a file of a picture, by its content; an archive, by its name too.
 pub(super) fn is_picture(path: &Path) -> bool {
@@ -43,6 +43,7 @@ fn gather(name: &str, bytes: usize, stored: &StoredPlanes) -> Value {
         Format::Npz => "NPZ",
         Format::Npy => "NPY",
         Format::Hdr => "Radiance HDR",
+        Format::Jpeg => "JPEG",
     };
     let plane = |plane: &firstlight::StoredPlane| {
         let as_written = stored.is_as_written(plane);

@@ -72,7 +72,8 @@ impl<'a> Contents<'a> {
     ) -> Result<Vec<Vec<u8>>, Failure> {
         let own = scene.display();
         let display = Display { exposure: plan.exposure.unwrap_or(own.exposure), ..own };
-        let files = FileSettings { display, depth_scale: plan.depth_scale, half: plan.half };
+        let files =
+            FileSettings { display, depth_scale: plan.depth_scale, half: plan.half, jpeg_quality: plan.quality };
         let bytes = |(output, buffers): &(&Output, Vec<Buffer>)| {
             let heat = (output.content == Content::Heat).then(|| film.heat()).flatten();
             let encoded = match heat {

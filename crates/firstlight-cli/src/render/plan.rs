@@ -37,6 +37,8 @@ pub(super) struct Plan<'a> {
     pub depth_scale: f64,
     /// Whether EXR files hold colours in 16-bit floats.
     pub half: bool,
+    /// Of JPEG files.
+    pub quality: u8,
     /// Warnings are errors.
     pub strict: bool,
     /// How a camera frames a scene that has none, as far as it was said.
@@ -98,6 +100,9 @@ impl<'a> Plan<'a> {
         }
         if args.half && !outputs.iter().any(|output| output.format == Format::Exr) {
             return Err(Failure::Usage("--half is for EXR files, as -o a.exr, and no output is one".into()));
+        }
+        if args.quality.is_some() && !outputs.iter().any(|output| output.format == Format::Jpeg) {
+            return Err(Failure::Usage("--quality is for JPEG files, as -o a.jpg, and no output is one".into()));
         }
         let heat = args.heat.as_deref().map(heat_output).transpose()?;
         let jobs: Vec<Job> = args
@@ -186,6 +191,7 @@ impl<'a> Plan<'a> {
             exposure: args.exposure,
             depth_scale: args.depth_scale.unwrap_or(FileSettings::default().depth_scale),
             half: args.half,
+            quality: args.quality.unwrap_or(FileSettings::default().jpeg_quality),
             strict: args.reading.strict,
             view: args.view,
             margin: args.margin,

@@ -144,6 +144,34 @@ fn another_version_is_held_to_the_tolerance() {
 }
 
 #[test]
+fn jpeg_files_are_told_verified_and_compared() {
+    let folder = Folder::with_scene();
+    folder.run("render scene.toml -o a.jpg -o b.JPEG -o a.png --quality 60").done();
+    folder.run("render scene.toml -o c.jpg").done();
+    assert!(folder.get("a.jpg") == folder.get("b.JPEG") && folder.get("a.jpg").len() < folder.get("c.jpg").len());
+    let stdout = folder.run("render scene.toml --format jpeg -o - --quality 60").done().stdout;
+    assert!(stdout == folder.get("a.jpg"));
+    let said = folder.run("info a.jpg").done().text();
+    for part in ["bytes, JPEG", "36 x 24 pixels", "scene_hash", "jpeg_quality", "60", "on black"] {
+        assert!(said.contains(part), "{part:?} is not in:\n{said}");
+    }
+    folder.run("render scene.toml -o depth=d.jpg").exits(1).says(&["it is no colour"]);
+    // The same losses in a render of today
+    let said = folder.run("verify a.jpg --scene scene.toml").done().text();
+    assert!(said.contains("the same bits"), "{said}");
+    // The film is brought to the same losses, a PNG file is as it is
+    folder.run("render scene.toml -o a.exr").done();
+    folder.run("diff a.jpg a.exr").done();
+    folder.run("diff a.jpg a.png").exits(3);
+    folder.run("diff a.jpg a.png --max 128").done();
+    folder.run("render scene.toml --buffers color,relight -o lights.exr").done();
+    let light = "relight lights.exr --light #1=x1";
+    folder.run(&format!("{light} -o d.jpg --quality 60 --exposure 0")).done();
+    folder.run(&format!("{light} -o e.png --quality 60")).exits(2).says(&["--quality", "JPEG"]);
+    folder.run(&format!("{light} -o e.exr --exposure 1")).exits(2).says(&["--exposure", "PNG and JPEG"]);
+}
+
+#[test]
 fn what_cannot_be_verified_is_said() {
     let folder = Folder::with_scene();
     folder.run("render scene.toml -o a.png -o a.exr").done();
@@ -157,7 +185,7 @@ fn what_cannot_be_verified_is_said() {
     folder.run("verify a.png --scene none.toml").exits(1).says(&["none.toml: no such file"]);
     folder.run("verify none.png").exits(1).says(&["none.png: no such file"]);
     folder.run("verify .").exits(1).says(&["is a folder"]);
-    folder.run("verify scene.toml").exits(1).says(&["scene.toml: is not a PNG, EXR, NPZ, NPY or HDR file"]);
+    folder.run("verify scene.toml").exits(1).says(&["scene.toml: is not a PNG, JPEG, EXR, NPZ, NPY or HDR file"]);
     for name in ["a.png", "a.exr"] {
         let whole = folder.get(name);
         folder.put("cut", &whole[..whole.len() / 2]);
@@ -263,7 +291,7 @@ fn what_cannot_be_compared_is_said() {
         ("diff a.png small.png", 1, "a.png is 24 x 16 pixels and small.png is 12 x 8"),
         ("diff a.npz n.exr", 1, "a.npz has color, depth and n.exr has normal: no buffer is in both"),
         ("diff a.npz n.exr --buffers normal", 1, "a.npz has no buffer normal; it has color, depth"),
-        ("diff a.png scene.toml", 1, "scene.toml: is not a PNG, EXR, NPZ, NPY or HDR file"),
+        ("diff a.png scene.toml", 1, "scene.toml: is not a PNG, JPEG, EXR, NPZ, NPY or HDR file"),
         ("diff a.png none.png", 1, "none.png: no such file"),
         ("diff a.png a.png -o a.png", 2, "would replace one of the two pictures"),
         ("diff a.png a.png -o d.exr", 2, "must end in .png"),

@@ -46,7 +46,7 @@ fn what_cannot_be_is_said() {
     folder.run("render scene.toml --buffers depth,object-id -o a.npz").done();
     folder.run("view-buffer a.npz dept").exits(1).says(&["did you mean \"depth\"?", "it has depth, object-id"]);
     folder.run("view-buffer none.npz depth").exits(1).says(&["no such file"]);
-    folder.run("view-buffer scene.toml depth").exits(1).says(&["is not a PNG, EXR, NPZ, NPY or HDR file"]);
+    folder.run("view-buffer scene.toml depth").exits(1).says(&["is not a PNG, JPEG, EXR, NPZ, NPY or HDR file"]);
     folder.run("view-buffer a.npz depth -o a.npz").exits(2).says(&["must end in .png"]);
     folder.run("view-buffer a.npz depth --range 2,1").exits(2).says(&["the lower one first"]);
     folder.run("render scene.toml --buffers color,normal,motion --motion-to side -o b.npz").done();

@@ -37,6 +37,14 @@ fn the_numbers_of_a_png_are_the_definition() {
     }
 }
 
+/// The encoder computes in whole numbers: these bytes are those of every machine.
+#[test]
+fn the_bytes_of_a_jpeg_are_the_same_everywhere() {
+    let bytes = picture(67, 41).encode(Format::Jpeg, &Display::default(), &Receipt::default()).unwrap();
+    let sum = bytes.iter().fold(0u32, |sum, byte| sum.rotate_left(5).wrapping_add(u32::from(*byte)));
+    assert_eq!((bytes.len(), sum), (0, 0));
+}
+
 /// Under gray light from everywhere the neutral display shows rough dielectrics in their base colours, to what the book
 /// says.
 #[test]

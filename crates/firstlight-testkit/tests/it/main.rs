@@ -10,6 +10,7 @@ mod golden;
 mod house;
 mod images;
 mod invalid;
+mod mtl;
 mod queries;
 mod receipts;
 mod reference;

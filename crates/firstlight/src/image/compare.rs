@@ -228,7 +228,8 @@ impl StoredPlanes {
         let settings = FileSettings { display: other.display(), ..FileSettings::of(&other.receipt) };
         let bytes = if name == Plane::Color.name() {
             let Some(pixels) = own.rgba() else { return Ok(self.clone()) };
-            Image { film: [width, height], window, pixels }.encode(other.format, &settings.display, &Receipt::default())
+            let plane = NamedPlane::new(Plane::Color, PlaneNumbers::Floats(pixels.as_flattened()));
+            encode_planes([width, height], window, &[plane], other.format, &settings, &Receipt::default())
         } else {
             let Some(plane) = BufferDesc::parse(name).ok().and_then(|desc| desc.plane()) else {
                 return Ok(self.clone());

@@ -9,13 +9,15 @@ use super::Format;
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The ending of a file's name is not that of a picture.
-    #[error("{}: {}; use .png, .exr, .npz, .npy or .hdr", path.display(), ending(path))]
+    #[error("{}: {}; use .png, .jpg, .exr, .npz, .npy or .hdr", path.display(), ending(path))]
     UnknownEnding {
         /// The file's name.
         path: PathBuf,
     },
     /// The program was built without EXR.
-    #[error("this build of firstlight has no EXR; use .png, .npz, .npy or .hdr, or build it with the feature `exr`")]
+    #[error(
+        "this build of firstlight has no EXR; use .png, .jpg, .npz, .npy or .hdr, or build it with the feature `exr`"
+    )]
     WithoutExr,
     /// An [`Image`](super::Image) whose pixels do not fill its window, or whose window is not in its film.
     #[error("{0}")]
@@ -23,13 +25,13 @@ pub enum ImageError {
     /// A format that holds one buffer, where several are to go.
     #[error("{} file holds one buffer; several go to .exr and .npz files", a(*format))]
     OneBuffer {
-        /// PNG, HDR or NPY.
+        /// PNG, JPEG, HDR or NPY.
         format: Format,
     },
     /// A buffer whose numbers a format cannot hold.
     #[error("{} file cannot hold {buffer}: {reason}; .exr, .npz and .npy files can", a(*format))]
     NotHeld {
-        /// PNG or HDR.
+        /// PNG, JPEG or HDR.
         format: Format,
         /// The buffer's name.
         buffer: String,
@@ -47,6 +49,9 @@ pub enum ImageError {
     /// A [`FileSettings::depth_scale`](super::FileSettings::depth_scale) outside what it may be.
     #[error("the depth scale is {0}; units per metre are needed, from 0.001 to 1000000")]
     DepthScale(f64),
+    /// A [`FileSettings::jpeg_quality`](super::FileSettings::jpeg_quality) outside what it may be.
+    #[error("the quality is {0}; that of a JPEG file is 1 to 100")]
+    JpegQuality(u8),
     /// A [`Display`](crate::Display) outside what it may be.
     #[error("{0}")]
     Display(String),
@@ -61,7 +66,7 @@ pub enum ImageError {
     /// A library failed to encode the picture.
     #[error("cannot be encoded as {format}: {reason}")]
     Encode {
-        /// `PNG`, `EXR` or `HDR`.
+        /// `PNG`, `JPEG`, `EXR` or `HDR`.
         format: &'static str,
         /// The library's words.
         reason: String,
@@ -139,6 +144,7 @@ fn a(format: Format) -> &'static str {
         Format::Npz => "an NPZ",
         Format::Npy => "an NPY",
         Format::Hdr => "an HDR",
+        Format::Jpeg => "a JPEG",
     }
 }
 

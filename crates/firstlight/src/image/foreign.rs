@@ -10,11 +10,11 @@ use codec::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use super::ImageError;
 use super::contain::contained;
-use super::read::{Limits, PictureHeader, TexelSamples, Texels, check_size};
+use super::read::{Limits, PictureHeader, SHORT, TexelSamples, Texels, check_size};
 use super::stored::StoredImage;
 
 /// The kinds of files that are read as textures, in the words of errors.
-pub(super) const KINDS: &str = "PNG, JPEG, WebP, TGA, BMP, GIF, TIFF, HDR or EXR";
+pub(super) const KINDS: &str = "PNG, JPEG, WebP, TGA, BMP, GIF, TIFF, QOI, PNM, HDR or EXR";
 
 /// A format, by the first bytes of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +35,10 @@ impl ForeignPicture {
             _ if starts(b"GIF87a") || starts(b"GIF89a") => ForeignPicture::Coded(ImageFormat::Gif, "GIF"),
             _ if starts(b"II*\0") || starts(b"MM\0*") => ForeignPicture::Coded(ImageFormat::Tiff, "TIFF"),
             _ if starts(b"BM") => ForeignPicture::Coded(ImageFormat::Bmp, "BMP"),
+            _ if starts(b"qoif") => ForeignPicture::Coded(ImageFormat::Qoi, "QOI"),
+            &[b'P', b'1'..=b'7', blank, ..] if blank.is_ascii_whitespace() || blank == b'#' => {
+                ForeignPicture::Coded(ImageFormat::Pnm, "PNM")
+            }
             _ if starts(b"#?RADIANCE\n") || starts(b"#?RGBE\n") => ForeignPicture::Hdr,
             _ if starts(&[0x76, 0x2f, 0x31, 0x01]) => ForeignPicture::Exr,
             _ if is_tga(bytes) => ForeignPicture::Coded(ImageFormat::Tga, "TGA"),
@@ -49,6 +53,7 @@ impl ForeignPicture {
                 let decoder = decoder(bytes, format, name)?;
                 let (width, height) = decoder.dimensions();
                 check_size(width, height, limits)?;
+                check_length(format, name, u64::from(width) * u64::from(height), bytes.len())?;
                 let (channels, sample) = kind(decoder.color_type());
                 Ok(PictureHeader { width, height, channels, sample })
             }),
@@ -93,6 +98,20 @@ impl ForeignPicture {
             ForeignPicture::Exr => "EXR",
         }
     }
+}
+
+/// Refuses what is too short for its size, so that memory is not taken for what is not there: a byte of a QOI file is at
+/// most a run of 62 texels, one of a PNM file at most 8 texels of one bit.
+fn check_length(format: ImageFormat, name: &'static str, texels: u64, bytes: usize) -> Result<(), ImageError> {
+    let each = match format {
+        ImageFormat::Qoi => 62,
+        ImageFormat::Pnm => 8,
+        _ => return Ok(()),
+    };
+    if texels > each * bytes as u64 {
+        return Err(ImageError::Damaged { format: name, reason: SHORT.into() });
+    }
+    Ok(())
 }
 
 /// The largest number of a texel: that of a half float, so that sums of texels are finite.
@@ -196,11 +215,21 @@ mod tests {
         bytes.into_inner()
     }
 
+    const FORMATS: [ImageFormat; 7] = [
+        ImageFormat::WebP,
+        ImageFormat::Tga,
+        ImageFormat::Bmp,
+        ImageFormat::Tiff,
+        ImageFormat::Gif,
+        ImageFormat::Qoi,
+        ImageFormat::Pnm,
+    ];
+
     #[test]
     fn every_format_gives_its_samples() {
-        for format in [ImageFormat::WebP, ImageFormat::Tga, ImageFormat::Bmp, ImageFormat::Tiff, ImageFormat::Gif] {
+        for format in FORMATS {
             for color in [ColorType::L8, ColorType::Rgb8, ColorType::Rgba8] {
-                if matches!((format, color), (ImageFormat::Gif | ImageFormat::WebP, ColorType::L8)) {
+                if matches!((format, color), (ImageFormat::Gif | ImageFormat::WebP | ImageFormat::Qoi, ColorType::L8)) {
                     continue;
                 }
                 let mut image = picture(color);
@@ -236,7 +265,7 @@ mod tests {
     fn sizes_are_checked_first_and_damage_does_no_harm() {
         let small = Limits { side: 4, texels: 1 << 20 };
         let mut numbers = firstlight_testkit::Random::new(1);
-        for format in [ImageFormat::WebP, ImageFormat::Tga, ImageFormat::Bmp, ImageFormat::Tiff, ImageFormat::Gif] {
+        for format in FORMATS {
             let bytes = encoded(&picture(ColorType::Rgba8).into_rgba8().into(), format);
             assert!(matches!(decode(&bytes, &small), Err(ImageError::TooLarge { .. })), "{format:?}");
             for _ in 0..300 {
@@ -247,5 +276,55 @@ mod tests {
                 let _ = decode(&damaged, &Limits { side: 1000, texels: 1 << 20 });
             }
         }
+    }
+
+    fn file(name: &str) -> Texels {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/images");
+        decode(&std::fs::read(folder.join(name)).unwrap(), &Limits::default()).unwrap()
+    }
+
+    #[test]
+    fn files_of_others_hold_the_same_picture() {
+        let png = file("bricks-color.png");
+        assert_eq!((png.width, png.height, png.channels), (160, 120, 3));
+        assert_eq!(file("bricks-color.bmp"), png);
+        assert_eq!(file("bricks-color.tga"), png);
+        let gray = file("bricks-gray.tga");
+        assert_eq!((gray.width, gray.height, gray.channels), (160, 120, 1));
+        // Lossy colours with an alpha
+        let (png, webp) = (file("python.png"), file("python.webp"));
+        assert_eq!((png.width, png.channels), (16, 4));
+        assert_eq!((webp.width, webp.height, webp.channels), (16, 16, 4));
+        let (TexelSamples::U8(png), TexelSamples::U8(webp)) = (png.data, webp.data) else { panic!() };
+        let pairs = png.as_chunks::<4>().0.iter().zip(webp.as_chunks::<4>().0);
+        let solid: Vec<_> = pairs.filter(|(png, _)| png[3] == 255).collect();
+        let off = |(png, webp): &(&[u8; 4], &[u8; 4])| (0..4).map(|i| u32::from(png[i].abs_diff(webp[i]))).sum::<u32>();
+        let mean = solid.iter().map(off).sum::<u32>() as f64 / (4 * solid.len()) as f64;
+        assert!(solid.len() > 50 && mean < 12.0, "{} {mean}", solid.len());
+    }
+
+    #[test]
+    fn plain_and_packed_maps_of_pixels() {
+        let of = |bytes: &[u8]| decode(bytes, &Limits::default()).unwrap();
+        let gray = |data: &[u8]| (1, TexelSamples::U8(data.to_vec()));
+        let got = |texels: Texels| {
+            assert_eq!((texels.width, texels.height), (3, 2));
+            (texels.channels, texels.data)
+        };
+        // In a bitmap 1 is black
+        assert_eq!(got(of(b"P1\n# made by hand\n3 2\n1 0 1\n0 0 1\n")), gray(&[0, 255, 0, 255, 255, 0]));
+        assert_eq!(got(of(b"P4 3 2\n\xa0\x20")), gray(&[0, 255, 0, 255, 255, 0]));
+        assert_eq!(got(of(b"P5\n3 2\n255\nabcdef")), gray(b"abcdef"));
+        // Of other numbers of steps
+        assert_eq!(got(of(b"P2 3 2 15\n0 5 10\n15 1 2\n")), gray(&[0, 85, 170, 255, 17, 34]));
+        let deep = TexelSamples::U16(vec![0x0102, 0x0304, 0x0506, 0x0708, 0x090a, 0xffff]);
+        let bytes = b"P5 3 2 65535\n\x01\x02\x03\x04\x05\x06\x07\x08\x09\x0a\xff\xff";
+        assert_eq!(got(of(bytes)), (1, deep));
+        // What claims more than it has takes no memory
+        for bytes in [&b"P6 30000 8000 255\nabc"[..], b"P1 30000 8000\n1 1", b"qoif\0\0\x70\0\0\0\x20\0\x04\0\0\0"] {
+            let fault = read_header(bytes, &Limits::default()).unwrap_err().to_string();
+            assert!(fault.contains("too short for its size"), "{fault}");
+        }
+        assert!(matches!(decode(b"Pz 3 2", &Limits::default()), Err(ImageError::UnknownKind { .. })));
     }
 }

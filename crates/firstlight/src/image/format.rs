@@ -19,10 +19,13 @@ pub enum Format {
     Npy,
     /// Radiance RGBE: linear Rec. 709 with a shared exponent; alpha is left out.
     Hdr,
+    /// JPEG, 8 bits a channel, display-encoded, with losses; alpha is left out.
+    Jpeg,
 }
 
 impl Format {
-    /// By the ending of a file's name, in capitals or not: `.png` (8 bits), `.exr`, `.npz`, `.npy`, `.hdr`.
+    /// By the ending of a file's name, in capitals or not: `.png` (8 bits), `.exr`, `.npz`, `.npy`, `.hdr`,
+    /// `.jpg` or `.jpeg`.
     ///
     /// # Errors
     /// [`ImageError::UnknownEnding`] for any other; [`ImageError::WithoutExr`] for `.exr` in a build without it.
@@ -35,8 +38,14 @@ impl Format {
             "npz" => Ok(Format::Npz),
             "npy" => Ok(Format::Npy),
             "hdr" => Ok(Format::Hdr),
+            "jpg" | "jpeg" => Ok(Format::Jpeg),
             _ => Err(ImageError::UnknownEnding { path: path.to_path_buf() }),
         }
+    }
+
+    /// Whether its files show colours as a display does, in 8 or 16 bits, and not as the film holds them.
+    pub fn is_display_encoded(self) -> bool {
+        matches!(self, Format::Png8 | Format::Png16 | Format::Jpeg)
     }
 }
 
@@ -49,18 +58,19 @@ mod tests {
         let of = |p: &str| Format::from_path(Path::new(p));
         assert_eq!(of("a/b.png").unwrap(), Format::Png8);
         assert_eq!(of("b.tar.HDR").unwrap(), Format::Hdr);
+        assert_eq!((of("b.jpg").unwrap(), of("b.JPEG").unwrap()), (Format::Jpeg, Format::Jpeg));
         #[cfg(feature = "exr")]
         assert_eq!(of("B.ExR").unwrap(), Format::Exr);
         #[cfg(not(feature = "exr"))]
         assert!(of("b.exr").unwrap_err().to_string().contains("feature `exr`"));
         let words = |p: &str| of(p).unwrap_err().to_string();
         assert_eq!(
-            words("out/b.jpg"),
-            "out/b.jpg: \".jpg\" is not the ending of a picture; use .png, .exr, .npz, .npy or .hdr"
+            words("out/b.gif"),
+            "out/b.gif: \".gif\" is not the ending of a picture; use .png, .jpg, .exr, .npz, .npy or .hdr"
         );
         assert_eq!(
             words(".png"),
-            ".png: has no ending that says which kind of picture to write; use .png, .exr, .npz, .npy or .hdr"
+            ".png: has no ending that says which kind of picture to write; use .png, .jpg, .exr, .npz, .npy or .hdr"
         );
     }
 }

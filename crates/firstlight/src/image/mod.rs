@@ -17,6 +17,7 @@ mod foreign;
 mod format;
 mod given;
 mod hdr;
+mod jpeg;
 mod npz;
 mod npz_read;
 mod patient;
@@ -89,7 +90,8 @@ const PREFIX: &str = "firstlight:";
 impl Image {
     /// The bytes of a picture file. The same picture and receipt give the same bytes, always.
     ///
-    /// 8- and 16-bit formats store straight alpha, encoded for `display`; without alpha if every pixel has alpha 1.
+    /// 8- and 16-bit formats are encoded for `display`. PNG stores straight alpha, and none if every pixel has alpha 1;
+    /// a JPEG file, of quality 90, has the picture on black.
     /// The others store the film as it is, and `display` has no part in them. NaN is stored as 0 and infinity as the
     /// largest number, except in EXR and NPZ, which have both.
     ///
@@ -209,7 +211,7 @@ mod tests {
         }
     }
 
-    const FORMATS: [Format; 5] = [Format::Png8, Format::Png16, Format::Exr, Format::Npz, Format::Hdr];
+    const FORMATS: [Format; 6] = [Format::Png8, Format::Png16, Format::Exr, Format::Npz, Format::Hdr, Format::Jpeg];
 
     fn built(format: Format) -> bool {
         format != Format::Exr || cfg!(feature = "exr")
@@ -257,10 +259,15 @@ mod tests {
             }
             let mut stored = StoredPlanes::read(&bytes).unwrap();
             assert_eq!(stored.format, format);
-            assert_eq!(stored.is_as_written(&stored.planes[0]), Some(true), "{format:?}");
+            // What JPEG loses is no change
+            let is_as_written = (format != Format::Jpeg).then_some(true);
+            assert_eq!(stored.is_as_written(&stored.planes[0]), is_as_written, "{format:?}");
             let described = stored.receipt.entries.pop().unwrap();
             assert!(described.0 == "buffer.color" && described.1.starts_with("channels R G B"), "{format:?}");
-            let is_shown = matches!(format, Format::Png8 | Format::Png16);
+            if format == Format::Jpeg {
+                assert_eq!(stored.receipt.entries.pop(), Some(("jpeg_quality".into(), "90".into())));
+            }
+            let is_shown = format.is_display_encoded();
             assert_eq!(stored.receipt, receipt().shown_by(is_shown.then(Display::default).as_ref()), "{format:?}");
             assert_eq!((stored.film, stored.window), (picture.film, picture.window));
         }
@@ -273,7 +280,7 @@ mod tests {
         for format in FORMATS.into_iter().filter(|&f| built(f)) {
             let of = |display: &Display, receipt: &Receipt| picture.encode(format, display, receipt).unwrap();
             let [plain, exposed] = [Display::default(), bright].map(|display| of(&display, &receipt()));
-            let is_shown = matches!(format, Format::Png8 | Format::Png16);
+            let is_shown = format.is_display_encoded();
             assert_eq!(plain != exposed, is_shown, "{format:?}");
             let stored = StoredImage::read(&exposed).unwrap().receipt;
             let said = stored.entries.iter().find(|(key, _)| key == "display").map(|(_, value)| value.as_str());

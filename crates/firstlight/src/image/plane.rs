@@ -431,7 +431,10 @@ impl PlaneFile<'_> {
             (Format::Png8, [plane]) => super::quantized::png(self.window, plane, Depth::Eight, settings, receipt),
             (Format::Png16, [plane]) => super::quantized::png(self.window, plane, Depth::Sixteen, settings, receipt),
             (Format::Hdr, [plane]) => Ok(super::quantized::hdr(self.window, plane, &receipt.shown_by(None))),
-            (Format::Npy | Format::Png8 | Format::Png16 | Format::Hdr, _) => Err(ImageError::OneBuffer { format }),
+            (Format::Jpeg, [plane]) => super::quantized::jpeg(self.window, plane, settings, receipt),
+            (Format::Npy | Format::Png8 | Format::Png16 | Format::Hdr | Format::Jpeg, _) => {
+                Err(ImageError::OneBuffer { format })
+            }
         }
     }
 

@@ -93,6 +93,11 @@ pub fn display_bytes(pixels: &[[f32; 4]], display: &Display, alpha: bool) -> Res
     Ok(quantize(rows, pixels, Depth::Eight, display, alpha))
 }
 
+/// The red, green and blue of a picture on black, 8 bits each. The display has been checked.
+pub(super) fn display_samples(window: Window, pixels: &[[f32; 4]], display: &Display) -> Vec<u8> {
+    quantize(window, pixels, Depth::Eight, display, false)
+}
+
 /// The samples of a picture.
 fn quantize(window: Window, pixels: &[[f32; 4]], depth: Depth, display: &Display, alpha: bool) -> Vec<u8> {
     let largest = depth.largest();

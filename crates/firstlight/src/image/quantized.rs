@@ -11,11 +11,12 @@
 //!   is.
 //! - alpha: gray.
 
+use super::jpeg::QUALITY_KEY;
 use super::plane::{BUFFER_KEY, is_half};
 use super::png::{self, ColorType, Depth, PngSamples};
 use super::{
     BufferDesc, Format, ImageError, NamedPlane, PREFIX, Plane, PlaneNumbers, PlaneVec, Receipt, StoredPlane, Window,
-    hdr,
+    hdr, jpeg,
 };
 use crate::color::{Display, Quantizer};
 
@@ -29,12 +30,14 @@ pub struct FileSettings {
     /// Whether EXR files hold colours and shares in 16-bit floats, which have 11 bits and end at 65504; larger numbers
     /// become that. All others stay as they are.
     pub half: bool,
+    /// The quality of JPEG files, 1 to 100: the more, the longer they are and the less is lost.
+    pub jpeg_quality: u8,
 }
 
 impl Default for FileSettings {
-    /// sRGB; millimetres; 32-bit floats.
+    /// sRGB; millimetres; 32-bit floats; quality 90.
     fn default() -> Self {
-        FileSettings { display: Display::default(), depth_scale: 1000.0, half: false }
+        FileSettings { display: Display::default(), depth_scale: 1000.0, half: false, jpeg_quality: 90 }
     }
 }
 
@@ -47,12 +50,23 @@ impl FileSettings {
         let said = receipt.get(SCALE_KEY).and_then(|scale| scale.parse().ok());
         let default = FileSettings::default();
         let half = receipt.entries.iter().any(|(key, said)| key.starts_with(BUFFER_KEY) && is_half(said));
-        FileSettings { depth_scale: said.unwrap_or(default.depth_scale), half, ..default }
+        let quality = receipt.get(QUALITY_KEY).and_then(|quality| quality.parse().ok());
+        FileSettings {
+            depth_scale: said.unwrap_or(default.depth_scale),
+            half,
+            jpeg_quality: quality.unwrap_or(default.jpeg_quality),
+            ..default
+        }
     }
 
     pub(super) fn check(&self) -> Result<(), ImageError> {
-        let is_scale = (1e-3..=1e6).contains(&self.depth_scale);
-        if is_scale { Ok(()) } else { Err(ImageError::DepthScale(self.depth_scale)) }
+        if !(1e-3..=1e6).contains(&self.depth_scale) {
+            return Err(ImageError::DepthScale(self.depth_scale));
+        }
+        if !(1..=100).contains(&self.jpeg_quality) {
+            return Err(ImageError::JpegQuality(self.jpeg_quality));
+        }
+        Ok(())
     }
 
     /// Whether files that can hold a plane in 16-bit floats do.
@@ -178,7 +192,7 @@ impl Format {
             (Format::Png8 | Format::Png16, NumberKind::Other) => {
                 Some("its numbers have no range that 16 bits could be made of".into())
             }
-            (Format::Hdr, kind) if kind != NumberKind::Color => Some("it is no colour".into()),
+            (Format::Hdr | Format::Jpeg, kind) if kind != NumberKind::Color => Some("it is no colour".into()),
             _ => None,
         }
     }
@@ -189,7 +203,7 @@ impl Format {
         let most = match self {
             Format::Exr => MAX_EXR_NAME,
             Format::Npz => MAX_NPZ_NAME,
-            Format::Png8 | Format::Png16 | Format::Npy | Format::Hdr => return None,
+            Format::Png8 | Format::Png16 | Format::Npy | Format::Hdr | Format::Jpeg => return None,
         };
         let length = name.len();
         (length > most).then(|| {
@@ -210,6 +224,16 @@ const MAX_NPZ_NAME: usize = 65535 - ".npy".len();
 /// The bytes of a Radiance file of one colour. The plane and the receipt have been checked.
 pub(super) fn hdr(window: Window, of: &NamedPlane, receipt: &Receipt) -> Vec<u8> {
     with_pixels(of, |pixels| hdr::encode(window, of, pixels, receipt))
+}
+
+/// The bytes of a JPEG file of one colour. The plane, the settings and the receipt have been checked.
+pub(super) fn jpeg(
+    window: Window,
+    of: &NamedPlane,
+    settings: &FileSettings,
+    receipt: &Receipt,
+) -> Result<Vec<u8>, ImageError> {
+    with_pixels(of, |pixels| jpeg::encode(window, of, pixels, settings, receipt))
 }
 
 /// The bytes of a PNG file of one plane. The plane, the settings and the receipt have been checked. `depth` is that of

@@ -171,7 +171,7 @@ fn jpeg_colors(decoder: &JpegDecoder<ZCursor<&[u8]>>) -> ColorSpace {
     }
 }
 
-const SHORT: &str = "it is too short for its size";
+pub(super) const SHORT: &str = "it is too short for its size";
 
 fn decode_png(bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError> {
     let damaged = |reason: String| ImageError::Damaged { format: "PNG", reason };

@@ -19,7 +19,7 @@ pub struct StoredImage {
     pub film: [u32; 2],
     /// The part of it that `pixels` holds. Only EXR knows where; the others begin at (0, 0).
     pub window: Window,
-    /// Red, green, blue, alpha; rows from the top, each from the left. PNG: display-encoded, straight alpha, 0 to 1.
+    /// Red, green, blue, alpha; rows from the top, each from the left. PNG and JPEG: display-encoded, straight alpha, 0 to 1.
     /// EXR: linear, premultiplied. HDR: linear. Alpha is 1 in a file without it.
     pub pixels: Vec<[f32; 4]>,
     /// What firstlight wrote into the file; empty in a file of other programs.
@@ -51,15 +51,15 @@ pub struct StoredPlane {
     pub name: String,
     /// The names of its channels, as [`Plane::channels`](crate::Plane::channels) has them.
     pub channels: Vec<String>,
-    /// Rows from the top, each from the left, the channels of a pixel side by side. The samples of a PNG file are whole
-    /// numbers.
+    /// Rows from the top, each from the left, the channels of a pixel side by side. The samples of PNG and JPEG files
+    /// are whole numbers.
     pub numbers: PlaneVec,
     /// Of a picture of 8 or 16 bits, which is display-encoded, the largest number: 255 or 65535.
     pub steps: Option<u32>,
 }
 
 impl StoredPlanes {
-    /// Reads a PNG, EXR, NPZ, NPY or HDR file; which of them, its first bytes say. Made for the files that firstlight
+    /// Reads a PNG, JPEG, EXR, NPZ, NPY or HDR file; which of them, its first bytes say. Made for the files that firstlight
     /// writes; those of other programs are read if they are of the same make: no tiles with levels, no compressed
     /// arrays.
     ///
@@ -69,6 +69,8 @@ impl StoredPlanes {
     pub fn read(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
         if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
             contained("PNG", || read_png(bytes))
+        } else if bytes.starts_with(&[0xff, 0xd8, 0xff]) {
+            super::jpeg::read(bytes)
         } else if bytes.starts_with(b"#?RADIANCE\n") {
             contained("HDR", || read_hdr(bytes))
         } else if bytes.starts_with(b"\x93NUMPY") {
@@ -81,7 +83,7 @@ impl StoredPlanes {
             #[cfg(not(feature = "exr"))]
             Err(ImageError::WithoutExr)
         } else {
-            Err(ImageError::UnknownKind { expected: "PNG, EXR, NPZ, NPY or HDR" })
+            Err(ImageError::UnknownKind { expected: "PNG, JPEG, EXR, NPZ, NPY or HDR" })
         }
     }
 
@@ -112,7 +114,7 @@ impl StoredPlanes {
 
 impl StoredPlane {
     /// The picture, with the first so many of its channels.
-    fn color(numbers: PlaneVec, channels: usize, steps: Option<u32>) -> Self {
+    pub(super) fn color(numbers: PlaneVec, channels: usize, steps: Option<u32>) -> Self {
         let name = Plane::Color.name().to_owned();
         let channels = Plane::Color.channels()[..channels].iter().map(|name| (*name).to_owned()).collect();
         StoredPlane { name, channels, numbers, steps }
@@ -139,7 +141,7 @@ impl StoredPlane {
 }
 
 impl StoredImage {
-    /// Reads the picture of a PNG, EXR, NPZ, NPY or HDR file, as [`StoredPlanes::read`].
+    /// Reads the picture of a PNG, JPEG, EXR, NPZ, NPY or HDR file, as [`StoredPlanes::read`].
     ///
     /// # Errors
     /// Those of [`StoredPlanes::read`]; [`ImageError::Damaged`] for a file without a picture.
@@ -400,7 +402,7 @@ mod tests {
     #[test]
     fn other_files_are_named_as_such() {
         let words = StoredImage::read(b"BM").unwrap_err().to_string();
-        assert_eq!(words, "is not a PNG, EXR, NPZ, NPY or HDR file; convert it to one");
+        assert_eq!(words, "is not a PNG, JPEG, EXR, NPZ, NPY or HDR file; convert it to one");
     }
 
     #[test]

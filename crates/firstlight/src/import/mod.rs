@@ -1,5 +1,7 @@
 //! Reading meshes of others: PLY, STL and OBJ, from bytes to a plain [`MeshData`].
 //!
+//! And files of materials, MTL: from bytes to statements, of which `material/mtl.rs` makes materials.
+//!
 //! The station before is whoever has the bytes (a scene's files come through [`Assets`](crate::Assets)); the station
 //! after is whoever makes shapes of them. Nothing here opens a file, compiles or transforms. Axes, units and the
 //! direction of v are left as the file has them, for the file does not say them.
@@ -17,6 +19,7 @@ mod error;
 mod foreign;
 mod given;
 mod gltf;
+pub(crate) mod mtl;
 mod obj;
 mod ply;
 mod polygon;
@@ -31,6 +34,7 @@ mod weld;
 use std::ops::{ControlFlow, Range};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::color::Encoding;
 use crate::math::{DVec3, origin_for};
 use error::ImportFault;
 pub use error::{ImportError, MeshPlace};
@@ -40,6 +44,7 @@ pub(crate) use given::from_own_origin;
 pub(crate) use gltf::{
     Contained, Gltf, GltfFault, GltfFiles, GltfNode, JsonPlace, MeshAddress, OpenFault, Pose, Uri, WithContained,
 };
+pub use mtl::MtlNote;
 pub use report::MeshReport;
 pub(crate) use tidy::used_vertices;
 
@@ -63,8 +68,8 @@ pub struct MeshData {
     pub normals: Vec<[f32; 3]>,
     /// Sets of texture coordinates, each per vertex; no set if the file has none. v as the file has it.
     pub uvs: Vec<Vec<[f32; 2]>>,
-    /// Per vertex: red, green, blue, **linear** Rec. 709, and alpha. Whole numbers in files are taken as sRGB and
-    /// decoded, fractions as linear already. Without alpha in the file it is 1.
+    /// Per vertex: red, green, blue, **linear** Rec. 709, and alpha. Colours in files are taken as sRGB and decoded,
+    /// whole numbers and fractions alike; fractions above 1 stay as they are. Without alpha in the file it is 1.
     pub colors: Vec<[f32; 4]>,
     /// Per vertex: the radius of a point of a PLY point set.
     pub radii: Vec<f32>,
@@ -228,6 +233,13 @@ impl MeshData {
         let outside = self.triangles.iter().flatten().find(|&&v| v as usize >= vertices);
         outside.map(|vertex| format!("vertex {vertex} of {vertices}"))
     }
+}
+
+/// The linear value of a colour in fractions, which is sRGB as one in whole numbers is. What is not between 0 and 1
+/// stays as it is.
+fn linear_of_fraction(encoded: f32) -> f32 {
+    let is_encoded = encoded > 0.0 && encoded < 1.0;
+    if is_encoded { Encoding::Srgb.decode(f64::from(encoded)) as f32 } else { encoded }
 }
 
 /// How far reading is, and whether to go on.

@@ -1,6 +1,6 @@
 //! Wavefront OBJ: polygons, with their texture coordinates, normals, materials, groups and smoothing.
 //!
-//! Read: `v` (three numbers; red, green, blue after them, as linear numbers; a single weight is ignored), `vt`, `vn`,
+//! Read: `v` (three numbers; red, green, blue after them, sRGB from 0 to 1; a single weight is ignored), `vt`, `vn`,
 //! `f` in all forms with indices from 1 or, negative, from the last (those of texture coordinates or normals are left
 //! out if the file has none at all), `o`, `g`, `s`, `usemtl`, the names of `mtllib`; `\` at the end of a line goes
 //! on with the next, `#` begins a comment. An index may point to what comes later. `l` and `p` are left out; free-form
@@ -22,9 +22,9 @@ use std::sync::Mutex;
 
 use super::error::{WRITE_ANEW, shown};
 use super::polygon::{self, PolygonCounts, triangles_of};
-use super::text::{Cursor, pieces};
+use super::text::{Cursor, decoded, pieces};
 use super::weld::weld;
-use super::{ImportFault, MAX_COUNT, MeshData, MeshPart, Progress, all};
+use super::{ImportFault, MAX_COUNT, MeshData, MeshPart, Progress, all, linear_of_fraction};
 use crate::parallel::{self, CHUNK};
 use piece::{Event, MAX_INDEX, NONE, Piece, RELATIVE, corner, skip_blanks, skip_line, word};
 
@@ -218,7 +218,10 @@ fn build(mut parts: Vec<Piece>, known: Known) -> Result<MeshData, ImportFault> {
 /// Makes vertices of corners, and lets triangles point to them.
 fn vertices(keys: &[[i32; 3]], known: Known, mesh: &mut MeshData, triangles: &mut [[u32; 3]]) {
     let Known { positions, colors, uvs, normals, .. } = known;
-    let alpha = |c: &[f32; 3]| [c[0], c[1], c[2], 1.0];
+    let linear = |c: &[f32; 3]| {
+        let [r, g, b] = c.map(linear_of_fraction);
+        [r, g, b, 1.0]
+    };
     let with = |kind: usize| parallel::count(keys.len(), CHUNK, |i| keys[i][kind] != NONE);
     let (with_uvs, with_normals) = (with(1), with(2));
     for (with, what) in [(with_uvs, "texture coordinates are 0 0"), (with_normals, "normals are 0 0 0")] {
@@ -236,7 +239,7 @@ fn vertices(keys: &[[i32; 3]], known: Known, mesh: &mut MeshData, triangles: &mu
     if same(1, with_uvs, uvs.len()) && same(2, with_normals, normals.len()) {
         let vertex = |i: u32| keys[i as usize][0] as u32 - 1;
         parallel::for_each_mut(triangles, CHUNK, |_, t| *t = t.map(vertex));
-        mesh.colors = parallel::map(colors.len(), CHUNK, |i| alpha(&colors[i]));
+        mesh.colors = parallel::map(colors.len(), CHUNK, |i| linear(&colors[i]));
         mesh.positions = positions;
         mesh.uvs = if with_uvs > 0 { vec![uvs] } else { Vec::new() };
         mesh.normals = if with_normals > 0 { normals } else { Vec::new() };
@@ -252,7 +255,7 @@ fn vertices(keys: &[[i32; 3]], known: Known, mesh: &mut MeshData, triangles: &mu
     let count = welded.first.len();
     mesh.positions = parallel::map(count, CHUNK, |i| positions[used(i)]);
     if !colors.is_empty() {
-        mesh.colors = parallel::map(count, CHUNK, |i| alpha(&colors[used(i)]));
+        mesh.colors = parallel::map(count, CHUNK, |i| linear(&colors[used(i)]));
     }
     if with_uvs > 0 {
         mesh.uvs = vec![parallel::map(count, CHUNK, |i| at(i, 1).map_or([0.0; 2], |n| uvs[n]))];
@@ -296,7 +299,7 @@ fn statements(parts: &[Piece], mesh: &mut MeshData) {
 }
 
 fn text_of(name: &[u8]) -> String {
-    String::from_utf8_lossy(name).into_owned()
+    decoded(name).0
 }
 
 /// Materials, groups and smoothing of the triangles.
@@ -396,7 +399,9 @@ mod tests {
     #[test]
     fn colors_weights_and_lines_that_go_on() {
         let mesh = read("v 0 0 0 1 0.5 0\nv 1 0 0 2\nv 1 \\\n 1 \\\r\n 0\nf 1 2 \\\n3 # 4 5\n# a path\\\nf 3 2 1\n");
-        assert_eq!(mesh.colors, [[1.0, 0.5, 0.0, 1.0], [1.0; 4], [1.0; 4]]);
+        // 0.5 is sRGB, of which 0.214 is the light
+        let half = 0.214_041_14;
+        assert_eq!(mesh.colors, [[1.0, half, 0.0, 1.0], [1.0; 4], [1.0; 4]]);
         assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 0]]);
         // Directly after a word or a number, within names, and where the file ends
         let text = "v\\\n0 0 0\nv 1\\\r\n0 0\nvt 1\\\n2\nv 1 1 0\\\n0.5\\\n0.25 1\ng one\\\ntwo\nf\\\n1 2\\\n3\ns\\\n";
@@ -404,7 +409,7 @@ mod tests {
             let mesh = read(&format!("{text}{end}"));
             assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 0]], "{end:?}");
             assert_eq!(mesh.positions, [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]], "{end:?}");
-            assert_eq!((mesh.colors[2], mesh.parts[0].group.as_str()), ([0.5, 0.25, 1.0, 1.0], "one"));
+            assert_eq!((mesh.colors[2], mesh.parts[0].group.as_str()), ([half, 0.050_876_09, 1.0, 1.0], "one"));
             assert_eq!((&mesh.smoothing[..], mesh.notes.len()), (&[0, 0][..], 0));
         }
     }

@@ -274,6 +274,26 @@ pub(super) fn pieces(bytes: &[u8], start: usize, size: usize, cut: impl Fn(usize
     pieces
 }
 
+/// What Windows-1252 has for the bytes 0x80 to 0x9f; the others are those of Latin-1.
+const WINDOWS_1252: [char; 32] = [
+    '\u{20ac}', '\u{81}', '\u{201a}', '\u{192}', '\u{201e}', '\u{2026}', '\u{2020}', '\u{2021}', '\u{2c6}', '\u{2030}',
+    '\u{160}', '\u{2039}', '\u{152}', '\u{8d}', '\u{17d}', '\u{8f}', '\u{90}', '\u{2018}', '\u{2019}', '\u{201c}',
+    '\u{201d}', '\u{2022}', '\u{2013}', '\u{2014}', '\u{2dc}', '\u{2122}', '\u{161}', '\u{203a}', '\u{153}', '\u{9d}',
+    '\u{17e}', '\u{178}',
+];
+
+/// A name: UTF-8, or else Windows-1252, which every text is. Whether it was the latter.
+pub(super) fn decoded(bytes: &[u8]) -> (String, bool) {
+    let of_windows = |&byte: &u8| match byte {
+        0x80..=0x9f => WINDOWS_1252[usize::from(byte - 0x80)],
+        _ => char::from(byte),
+    };
+    match std::str::from_utf8(bytes) {
+        Ok(text) => (text.to_owned(), false),
+        Err(_) => (bytes.iter().map(of_windows).collect(), true),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

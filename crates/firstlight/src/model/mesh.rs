@@ -1,30 +1,141 @@
 //! Models of one mesh or of points: PLY, STL and OBJ.
 
-use super::{ModelParts, ModelShape, clay, material_name, shown};
+use std::collections::HashSet;
+
+use super::{ModelParts, ModelShape, ModelWarning, MtlSettings, clay, material_name, read_mtl, shown};
+use crate::context::{AssetError, Assets};
 use crate::describe::FilePath;
+use crate::describe::value::join_path;
+use crate::image::read::{Limits, read_header};
 use crate::import::MeshData;
 use crate::math::DAffine3;
 use crate::shape::{MeshDesc, PointSetDesc, ShapeDesc};
+use crate::texture::TextureDesc;
 
 /// Faces of files without normals that meet at up to this angle, in degrees, are parts of something round.
 const SMOOTH_DEG: f64 = 30.0;
+/// The height of white in a bump map of an MTL file with `-bm 1`, in sizes of the model: the file has no unit of it.
+const BUMP_HEIGHT: f64 = 0.01;
+/// The largest MTL file, in bytes.
+const MAX_MTL: u64 = 64 << 20;
+/// The largest picture that is looked at for alpha, in bytes.
+const MAX_PICTURE: u64 = 1 << 30;
 
-/// What a file of one mesh describes; `chosen` is the scene's own material for one of the file, by its name there.
-pub(crate) fn describe_mesh(
-    file: &str,
-    data: &MeshData,
-    (smooth_deg, is_unlit): (Option<f64>, bool),
-    chosen: &dyn Fn(&str) -> Option<String>,
-) -> ModelParts {
+/// What is shown of a file of one mesh.
+pub(crate) struct ShownMesh<'a> {
+    /// The file, as the scene names it.
+    pub file: &'a str,
+    pub smooth_deg: Option<f64>,
+    /// Whether materials show their colours, whatever light there is.
+    pub unlit: bool,
+    /// The scene's own material for one of the file, by its name there.
+    pub chosen: &'a dyn Fn(&str) -> Option<String>,
+    /// Where files come from.
+    pub assets: &'a dyn Assets,
+}
+
+/// What a file of one mesh describes.
+pub(crate) fn describe_mesh(data: &MeshData, shown_mesh: &ShownMesh<'_>) -> ModelParts {
+    let ShownMesh { file, smooth_deg, unlit, chosen, .. } = *shown_mesh;
     let mut parts = ModelParts::default();
-    let default = material_name(file, "default", is_unlit);
+    let default = material_name(file, "default", unlit);
     let smooth_deg = smooth_deg.or(data.normals.is_empty().then_some(SMOOTH_DEG));
     let mut mesh = MeshDesc { file: Some(FilePath(file.to_owned())), smooth_deg, ..MeshDesc::default() };
-    mesh.materials = data.materials.iter().map(|name| chosen(name).unwrap_or_else(|| default.clone())).collect();
+    let size = data.used_bounds().map_or(0.0, |[low, high]| (high - low).length());
+    let described = add_mtl(&mut parts, data, shown_mesh, size);
+    let of_name = |name: &String| match chosen(name) {
+        Some(chosen) => chosen,
+        None if described.contains(name) => material_name(file, name, unlit),
+        None => default.clone(),
+    };
+    mesh.materials = data.materials.iter().map(of_name).collect();
+    let missing = |name: &&String| !name.is_empty() && !described.contains(*name) && chosen(name).is_none();
+    let missing: Vec<&String> = data.materials.iter().filter(missing).collect();
+    if let (Some(first), false) = (missing.first(), data.material_files.is_empty()) {
+        let message = format!("{} of its materials are described in no MTL file, {first:?} for one", missing.len());
+        parts.warnings.push(ModelWarning { message, hint: "their faces are of a light gray".to_owned() });
+    }
     mesh.material = Some(default.clone());
-    parts.materials.push((default, shown(clay(!data.colors.is_empty()), is_unlit)));
+    parts.materials.push((default, shown(clay(!data.colors.is_empty()), unlit)));
     parts.shapes.push(ModelShape { shape: ShapeDesc::Mesh(mesh), model_from_shape: DAffine3::IDENTITY });
     parts
+}
+
+/// Adds the materials of the MTL files that faces of the mesh have; the answer are their names in the file.
+fn add_mtl(parts: &mut ModelParts, data: &MeshData, shown_mesh: &ShownMesh<'_>, size: f64) -> HashSet<String> {
+    let ShownMesh { file, unlit, chosen, assets, .. } = *shown_mesh;
+    let folder = file.rsplit_once('/').map_or("", |(folder, _)| folder);
+    let mut described = HashSet::new();
+    for written in &data.material_files {
+        let Some((path, bytes)) = read_beside(written, folder, assets) else {
+            let message = format!("{written:?}: there is no such file of materials");
+            let hint = "its faces are of a light gray; an OBJ file needs its MTL files beside it";
+            parts.warnings.push(ModelWarning { message, hint: hint.to_owned() });
+            continue;
+        };
+        let bytes = match bytes {
+            Ok(bytes) => bytes,
+            Err(error) => {
+                let hint = "its faces are of a light gray".to_owned();
+                parts.warnings.push(ModelWarning { message: format!("{path:?}: {error}"), hint });
+                continue;
+            }
+        };
+        let inside = path.rsplit_once('/').map_or("", |(folder, _)| folder).to_owned();
+        let has_alpha = |picture: &str| {
+            let bytes = assets.read(&join_path(&inside, picture), MAX_PICTURE).ok()?;
+            Some(read_header(&bytes, &Limits::default()).ok()?.has_alpha())
+        };
+        let is_wanted = |name: &str| {
+            data.materials.iter().any(|own| own == name) && !described.contains(name) && chosen(name).is_none()
+        };
+        let settings = MtlSettings {
+            is_wanted: &is_wanted,
+            texture_name: &|name| format!("{path}/{name}"),
+            has_alpha: &has_alpha,
+            bump_height: size * BUMP_HEIGHT,
+        };
+        let read = match read_mtl(&path, &bytes, &settings) {
+            Ok(read) => read,
+            Err(error) => {
+                let hint = "its faces are of a light gray".to_owned();
+                parts.warnings.push(ModelWarning { message: error.to_string(), hint });
+                continue;
+            }
+        };
+        for note in read.notes {
+            let hint = note.hint.unwrap_or_default();
+            parts.notes.push(ModelWarning { message: format!("{path}:{}: {}", note.line, note.message), hint });
+        }
+        for (name, mut texture) in read.textures {
+            if let TextureDesc::Image(image) = &mut texture {
+                image.file.0 = join_path(&inside, &image.file.0);
+            }
+            parts.textures.push((name, texture));
+        }
+        for (name, material) in read.materials {
+            parts.materials.push((material_name(file, &name, unlit), shown(material, unlit)));
+            described.insert(name);
+        }
+    }
+    described
+}
+
+/// A file that an OBJ file names, from the folder of that; where its path leads nowhere, by its own name beside it. The
+/// answer is its path in the scene.
+fn read_beside(written: &str, folder: &str, assets: &dyn Assets) -> Option<(String, Result<Vec<u8>, AssetError>)> {
+    let written = written.trim().replace('\\', "/");
+    let alone = written.rsplit('/').next().unwrap_or_default();
+    let mut refused = None;
+    for path in [written.as_str(), alone] {
+        let path = join_path(folder, path);
+        match assets.read(&path, MAX_MTL) {
+            Err(AssetError::NotFound) => {}
+            Err(error @ AssetError::Outside) => refused = Some((path, Err(error))),
+            read => return Some((path, read)),
+        }
+    }
+    refused
 }
 
 /// What a file of points describes.

@@ -6,9 +6,11 @@
 
 mod gltf;
 mod mesh;
+mod mtl;
 
 pub(crate) use gltf::{ShownModel, describe as describe_gltf};
-pub(crate) use mesh::{describe_mesh, describe_points};
+pub(crate) use mesh::{ShownMesh, describe_mesh, describe_points};
+pub use mtl::{MtlMaterials, MtlSettings, read_mtl};
 
 use crate::camera::CameraDesc;
 use crate::describe::{ColorParam, NumberParam};
@@ -30,6 +32,8 @@ pub(crate) struct ModelParts {
     pub cameras: Vec<(String, CameraDesc)>,
     /// What was put up with.
     pub warnings: Vec<ModelWarning>,
+    /// What is told, though nothing is wrong for certain.
+    pub notes: Vec<ModelWarning>,
 }
 
 /// A shape of a model and where it stands in the space of the file.

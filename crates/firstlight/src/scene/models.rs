@@ -8,7 +8,7 @@ use crate::context::{Assets, CompileContext};
 use crate::describe::node::quoted;
 use crate::import::{MeshFormat, OpenFault, is_gltf, is_point_set};
 use crate::math::{DAffine3, DMat3, DVec3};
-use crate::model::{ModelParts, ShownModel, describe_gltf, describe_mesh, describe_points, unique};
+use crate::model::{ModelParts, ShownMesh, ShownModel, describe_gltf, describe_mesh, describe_points, unique};
 use crate::shape::{GroupDesc, MeshFiles, ModelDesc, ShapeDesc, UpAxis, load_mesh_file, read_mesh_bytes, unreadable};
 use crate::transform::TransformDesc;
 
@@ -165,7 +165,11 @@ impl ModelDesc {
             ModelKind::Mesh(_) => {
                 let (data, _) = load_mesh_file(cx, assets, &self.file, files)?;
                 let names = data.materials.clone();
-                (describe_mesh(file, &data, (self.smooth_deg, self.unlit), &chosen), names)
+                {
+                    let shown =
+                        ShownMesh { file, smooth_deg: self.smooth_deg, unlit: self.unlit, chosen: &chosen, assets };
+                    (describe_mesh(&data, &shown), names)
+                }
             }
             ModelKind::Gltf => {
                 let gltf = match files.open.gltf.open(file, assets) {
@@ -208,6 +212,9 @@ impl ModelDesc {
         }
         for warning in &parts.warnings {
             cx.warning("file", format!("{}: {}", quoted(file), warning.message), Some(&warning.hint));
+        }
+        for note in &parts.notes {
+            cx.advise("file", format!("{}: {}", quoted(file), note.message), Some(&note.hint));
         }
         let turned = DAffine3 { matrix3: DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y), translation: DVec3::ZERO };
         let up = if self.up.unwrap_or(up) == UpAxis::Z { turned } else { DAffine3::IDENTITY };

@@ -3,7 +3,7 @@
 //! What is read, by name, in any order and of any type:
 //!
 //! - `vertex`: `x y z`; `nx ny nz`; texture coordinates `u v`, `s t`, `texture_u texture_v`, `u1 v1` or `texture_s
-//!   texture_t`; colours `red green blue alpha`, `diffuse_red ...` or `r g b a`; `radius`;
+//!   texture_t`; colours `red green blue alpha`, `diffuse_red ...` or `r g b a`, sRGB; `radius`;
 //! - `face`: the list `vertex_indices` or `vertex_index`; the list `texcoord` (two numbers for each corner, as MeshLab
 //!   writes); `red green blue alpha` in bytes, where vertices have no colours. The last two part vertices;
 //! - `tristrips`: the list `vertex_indices`, with -1 between strips.
@@ -95,13 +95,14 @@ mod tests {
     }
 
     #[test]
-    fn colors_in_fractions_are_linear() {
+    fn colors_in_fractions_are_srgb() {
         let mut text = "ply\nformat ascii 1.0\nelement vertex 1\n".to_string();
         for name in ["x", "y", "z", "red", "green", "blue", "alpha"] {
             text += &format!("property float {name}\n");
         }
         let mesh = read((text + "end_header\n1 2 3 0.5 2 0 0.25").as_bytes()).unwrap();
-        assert_eq!(mesh.colors, [[0.5, 2.0, 0.0, 0.25]]);
+        // As in bytes: 0.5 is 0.214 of the light. What is above 1 stays, and so does alpha
+        assert_eq!(mesh.colors, [[0.214_041_14, 2.0, 0.0, 0.25]]);
         assert_eq!(mesh.positions, [[1.0, 2.0, 3.0]]);
         assert!(mesh.triangles.is_empty());
     }

@@ -1,7 +1,7 @@
 //! What is read of a PLY file: which property of which element is what.
 
 use super::super::error::{WRITE_ANEW, shown};
-use super::super::{ImportFault, MAX_COUNT};
+use super::super::{ImportFault, MAX_COUNT, linear_of_fraction};
 use super::header::{DataEncoding, Element, Header, PropertyKind, Scalar};
 use crate::color::Encoding;
 use crate::parallel;
@@ -83,7 +83,7 @@ impl ColorScale {
     pub fn linear(&self, raw: [f32; 4]) -> [f32; 4] {
         let [r, g, b, a] = raw;
         if self.table.is_empty() {
-            return raw;
+            return [linear_of_fraction(r), linear_of_fraction(g), linear_of_fraction(b), a];
         }
         let largest = self.table.len() - 1;
         // Casting clamps below
