@@ -366,6 +366,14 @@ impl Input {
         self.assets.again = true;
     }
 
+    /// The description with the parts of its models in place of them, as they are at `time`.
+    ///
+    /// # Errors
+    /// What is wrong with the models.
+    pub fn without_models(&self, time: f64) -> Result<SceneDesc, Failure> {
+        self.parsed.desc.without_models(&self.assets, time).map_err(|e| Failure::Scene(e.faults))
+    }
+
     /// Compiles the description as it is now, at `time` in seconds. Files are read the first time only: a scene has the
     /// same textures in all its frames. What takes its time is told, unless `quiet`.
     ///

@@ -32,9 +32,9 @@ pub(super) fn run(plan: &Plan, file: Option<&Path>, reading: &ReadingArgs) -> Re
     }
     let mut input = input::read(job.scene, reading)?;
     plan.join(job, &mut input)?;
-    let compiled = input.compile(0.0, plan.quiet)?;
+    let compiled = input.compile(plan.time, plan.quiet)?;
     show_diagnostics(&compiled.warnings);
-    let mut desc = input.parsed.desc;
+    let mut desc = input.without_models(plan.time)?;
     compiled.added.add_to(&mut desc);
 
     // Files are named as they are seen from the text

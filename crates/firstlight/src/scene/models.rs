@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use super::SceneDesc;
 use crate::context::{Assets, CompileContext};
 use crate::describe::node::quoted;
+use crate::error::{SceneError, Severity};
 use crate::import::{MeshFormat, OpenFault, is_gltf, is_point_set};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::model::{ModelParts, ShownMesh, ShownModel, describe_gltf, describe_mesh, describe_points, unique};
@@ -20,6 +21,20 @@ enum ModelKind {
 }
 
 impl SceneDesc {
+    /// The description with the parts of its models in place of them, as they are at `time`, in seconds. What lies
+    /// within their files is named by its address, as `chair.glb#mesh/0`, so that it means the same picture.
+    ///
+    /// # Errors
+    /// What is wrong with the models and their files.
+    pub fn without_models(&self, assets: &dyn Assets, time: f64) -> Result<SceneDesc, SceneError> {
+        let cx = &mut CompileContext::at_time(time);
+        let mut desc = self.with_models(cx, assets, &mut MeshFiles::default()).into_owned();
+        let mut faults = cx.take_faults();
+        faults.retain(|fault| fault.severity == Severity::Error);
+        desc.sort();
+        if faults.is_empty() { Ok(desc) } else { Err(SceneError { faults }) }
+    }
+
     /// The description with the parts of its models in place of them, at the moment of `cx`; as it is without models.
     /// What is wrong with their files is said at `model[i]`.
     pub(super) fn with_models(

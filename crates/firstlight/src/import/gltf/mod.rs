@@ -23,6 +23,8 @@ mod files;
 mod json;
 mod mesh;
 mod nodes;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
