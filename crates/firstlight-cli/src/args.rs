@@ -282,11 +282,11 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub reading: ReadingArgs,
 
-    /// A picture to write: its ending, .png, .jpg, .exr, .npz, .npy or .hdr, says the format; - is standard output. With
-    /// NAME= before it, one buffer by itself, as in depth=depth.png (`firstlight buffers` lists them all), rendered
-    /// whatever --buffers says; a file whose own name has a = is written as ./a=b.png. {stem} in it is the scene's file
-    /// name without its ending, {name} the whole of it; with several scenes one of them is needed, in --heat and
-    /// --stats too. May be given several times [default: the scene's name with .png, or with .render.png
+    /// A picture to write: its ending, .png, .jpg, .exr, .npz, .npy or .hdr, says the format; - is standard output.
+    /// With NAME= before it, one buffer by itself, as in depth=depth.png (`firstlight buffers` lists them all),
+    /// rendered whatever --buffers says; a file whose own name has a = is written as ./a=b.png. {stem} in it is the
+    /// scene's file name without its ending, {name} the whole of it; with several scenes one of them is needed, in
+    /// --heat and --stats too. May be given several times [default: the scene's name with .png, or with .render.png
     /// where that is a file not written by firstlight; a course file's output_file; in the working folder]
     #[arg(short, long = "output", value_name = "[NAME=]FILE", value_hint = ValueHint::FilePath)]
     #[arg(help_heading = "Output")]
@@ -308,8 +308,8 @@ pub struct RenderArgs {
     /// The format of -o - and of names without an ending, such as /dev/null [default: png for -]
     #[arg(long, value_name = "FORMAT", help_heading = "Output")]
     pub format: Option<NamedFormat>,
-    /// The quality of JPEG files, 1 to 100: the more, the longer they are and the less is lost. They have no alpha: what
-    /// lets light through lies on black [default: 90]
+    /// The quality of JPEG files, 1 to 100: the more, the longer they are and the less is lost. They have no alpha:
+    /// what lets light through lies on black [default: 90]
     #[arg(long, value_name = "N", value_parser = quality, help_heading = "Output")]
     pub quality: Option<u8>,
     /// Units per metre of depth and distance in PNG files, 0.001 to 1000000: 1000 are millimetres, as in ScanNet and
@@ -582,7 +582,8 @@ pub struct RelightArgs {
     /// order. May be given several times, in effect in that order
     #[arg(long, value_name = "NAME=CHANGE", value_parser = crate::relight::change, required = true)]
     pub light: Vec<(String, LightChange)>,
-    /// A picture to write: its ending, .png, .jpg, .exr, .npz, .npy or .hdr, says the format. May be given several times
+    /// A picture to write: its ending, .png, .jpg, .exr, .npz, .npy or .hdr, says the format. May be given several
+    /// times
     #[arg(short, long = "output", value_name = "FILE", value_hint = ValueHint::FilePath, required = true)]
     pub output: Vec<PathBuf>,
     /// Bits in each channel of PNG files [default: 8]

@@ -100,8 +100,8 @@ impl ForeignPicture {
     }
 }
 
-/// Refuses what is too short for its size, so that memory is not taken for what is not there: a byte of a QOI file is at
-/// most a run of 62 texels, one of a PNM file at most 8 texels of one bit.
+/// Refuses what is too short for its size, so that memory is not taken for what is not there: a byte of a QOI file is
+/// at most a run of 62 texels, one of a PNM file at most 8 texels of one bit.
 fn check_length(format: ImageFormat, name: &'static str, texels: u64, bytes: usize) -> Result<(), ImageError> {
     let each = match format {
         ImageFormat::Qoi => 62,

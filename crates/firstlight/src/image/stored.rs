@@ -19,8 +19,8 @@ pub struct StoredImage {
     pub film: [u32; 2],
     /// The part of it that `pixels` holds. Only EXR knows where; the others begin at (0, 0).
     pub window: Window,
-    /// Red, green, blue, alpha; rows from the top, each from the left. PNG and JPEG: display-encoded, straight alpha, 0 to 1.
-    /// EXR: linear, premultiplied. HDR: linear. Alpha is 1 in a file without it.
+    /// Red, green, blue, alpha; rows from the top, each from the left. PNG and JPEG: display-encoded, straight alpha, 0
+    /// to 1. EXR: linear, premultiplied. HDR: linear. Alpha is 1 in a file without it.
     pub pixels: Vec<[f32; 4]>,
     /// What firstlight wrote into the file; empty in a file of other programs.
     pub receipt: Receipt,
@@ -59,9 +59,9 @@ pub struct StoredPlane {
 }
 
 impl StoredPlanes {
-    /// Reads a PNG, JPEG, EXR, NPZ, NPY or HDR file; which of them, its first bytes say. Made for the files that firstlight
-    /// writes; those of other programs are read if they are of the same make: no tiles with levels, no compressed
-    /// arrays.
+    /// Reads a PNG, JPEG, EXR, NPZ, NPY or HDR file; which of them, its first bytes say. Made for the files that
+    /// firstlight writes; those of other programs are read if they are of the same make: no tiles with levels, no
+    /// compressed arrays.
     ///
     /// # Errors
     /// [`ImageError::UnknownKind`]; [`ImageError::TooLarge`] above 65536 a side or 2^27 in all, the largest film;

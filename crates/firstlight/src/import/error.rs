@@ -146,7 +146,7 @@ fn line_of(bytes: &[u8], offset: usize) -> u64 {
 }
 
 /// A piece of a file as it can be shown in a message: at most 40 characters. What is no text is not shown.
-pub(super) fn shown(word: &[u8]) -> String {
+pub(crate) fn shown(word: &[u8]) -> String {
     let start = match std::str::from_utf8(&word[..word.len().min(160)]) {
         Ok(start) => start,
         // Cut within a character

@@ -37,6 +37,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::color::Encoding;
 use crate::math::{DVec3, origin_for};
 use error::ImportFault;
+pub(crate) use error::shown;
 pub use error::{ImportError, MeshPlace};
 pub use foreign::is_gltf;
 pub(crate) use foreign::{WantedFile, foreign};

@@ -188,7 +188,8 @@ pub(crate) fn read(name: &str, bytes: &[u8], notes: &mut MtlNotes) -> Result<Vec
         let place = MeshPlace::Byte(at as u64);
         return Err(ImportError::Damaged { file: name.to_owned(), place, message, hint });
     }
-    let mut file = Reader { notes, line: 0, materials: Vec::new(), names: HashMap::new(), state: State::Before };
+    let mut file =
+        StatementReader { notes, line: 0, materials: Vec::new(), names: HashMap::new(), state: State::Before };
     let start = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
     let mut text = Cursor { bytes, at: start };
     let mut line = 1;
@@ -200,7 +201,7 @@ pub(crate) fn read(name: &str, bytes: &[u8], notes: &mut MtlNotes) -> Result<Vec
             return Err(too_many("materials", file.materials.len() as u64, MAX_MATERIALS));
         }
     }
-    let Reader { materials, .. } = file;
+    let StatementReader { materials, .. } = file;
     if materials.is_empty() {
         notes.add("empty", 1, "holds no material", "a material begins with the line `newmtl NAME`");
     }
@@ -243,7 +244,7 @@ enum State {
     LeftOut,
 }
 
-struct Reader<'n> {
+struct StatementReader<'n> {
     notes: &'n mut MtlNotes,
     line: u64,
     materials: Vec<MtlMaterial>,
@@ -270,7 +271,7 @@ const UNUSED: &[&str] = &[
     "map_tf",
 ];
 
-impl Reader<'_> {
+impl StatementReader<'_> {
     /// `first`: the first of the lines that are `whole` together.
     fn statement(&mut self, first: &[u8], whole: &[u8]) {
         let mut text = Cursor { bytes: whole, at: 0 };
@@ -521,8 +522,13 @@ impl Reader<'_> {
         for at in starts.take(4) {
             let mut tail = Cursor { bytes: rest, at };
             let (mut notes, mut picture) = (MtlNotes::default(), MtlPicture::new(1));
-            let mut dry =
-                Reader { notes: &mut notes, line: 1, materials: Vec::new(), names: HashMap::new(), state: self.state };
+            let mut dry = StatementReader {
+                notes: &mut notes,
+                line: 1,
+                materials: Vec::new(),
+                names: HashMap::new(),
+                state: self.state,
+            };
             if dry.option(&mut tail, &mut picture, false) {
                 tail.skip_blanks();
                 if tail.at_end() {

@@ -1,17 +1,17 @@
 //! What a Wavefront MTL file says of surfaces, as materials and textures of a scene.
 //!
-//! The station before is the reader of statements, `import/mtl.rs`; the station after is whoever adds the materials to a
-//! scene. Nothing here opens a file. What the terms become:
+//! The station before is the reader of statements, `import/mtl.rs`; the station after is whoever adds the materials to
+//! a scene. Nothing here opens a file. What the terms become:
 //!
 //! - Without a term of the metallic-roughness kind (`Pr`, `Pm`, `Ps`, `Pc`, `Pcr`, `aniso`, `anisor` and their maps) a
-//!   material is `phong`: `Kd` is `diffuse`, `Ks` `specular`, `Ns` `shininess`. `illum 1` has no highlight; `illum 0` is
-//!   `unlit` in the colour `Kd`. With one it is `metallic-roughness`: `Kd` is `base_color`, `Pr` `roughness`, `Pm`
+//!   material is `phong`: `Kd` is `diffuse`, `Ks` `specular`, `Ns` `shininess`. `illum 1` has no highlight; `illum 0`
+//!   is `unlit` in the colour `Kd`. With one it is `metallic-roughness`: `Kd` is `base_color`, `Pr` `roughness`, `Pm`
 //!   `metallic`, `Pc` and `Pcr` the coat, `Ni` above 1 `ior`; `Ks`, `Ns`, `Ka` and `illum` are not used.
 //! - Colours are linear, as Blender writes and reads them.
 //! - `Ka` is `ambient` where it is a colour or has a map. Where it is a gray it is what a program writes into every
 //!   material, 0, 0.2 or 1, whatever the surface: then `ambient` is the diffuse colour, as in all scenes.
-//! - A map is multiplied with its factor, as the specification says. Programs write a factor of 0 beside a map that they
-//!   show, so 0 counts as 1 there.
+//! - A map is multiplied with its factor, as the specification says. Programs write a factor of 0 beside a map that
+//!   they show, so 0 counts as 1 there.
 //! - `d` and 1 - `Tr` are `alpha`, `d` before `Tr`; where there is anything to see through, `alpha_mode` is `blend`.
 //! - A number takes the luminance of its map, or the channel that `-imfchan` says; `map_d` takes the alpha of a picture
 //!   that has one.
@@ -23,7 +23,7 @@ use std::collections::{HashMap, HashSet};
 
 use crate::describe::{Channel, ColorParam, FilePath, NumberParam, ParamDesc};
 use crate::import::mtl::{self, MtlColor, MtlMap, MtlMaterial, MtlNotes, MtlNumber, MtlPicture};
-use crate::import::{ImportError, MtlNote};
+use crate::import::{ImportError, MtlNote, shown};
 use crate::material::{AlphaMode, MaterialCommonDesc, MaterialDesc, MetallicRoughnessDesc, PhongDesc, UnlitDesc};
 use crate::texture::{Filter, ImageTextureDesc, TextureDesc, TextureSpace, Wrap};
 
@@ -60,7 +60,7 @@ pub struct MtlMaterials {
 pub fn read_mtl(name: &str, bytes: &[u8], settings: &MtlSettings<'_>) -> Result<MtlMaterials, ImportError> {
     let mut notes = MtlNotes::default();
     let read = mtl::read(name, bytes, &mut notes)?;
-    let mut file = Translation { settings, notes, textures: Textures::default() };
+    let mut file = Translation { settings, notes, textures: MtlTextures::default() };
     let wanted = read.iter().filter(|material| (settings.is_wanted)(&material.name));
     let materials = wanted.map(|material| (material.name.clone(), file.material(material))).collect();
     Ok(MtlMaterials { materials, textures: file.textures.list, notes: file.notes.finish() })
@@ -68,7 +68,7 @@ pub fn read_mtl(name: &str, bytes: &[u8], settings: &MtlSettings<'_>) -> Result<
 
 /// The textures so far: each picture once for each way it lies.
 #[derive(Default)]
-struct Textures {
+struct MtlTextures {
     list: Vec<(String, TextureDesc)>,
     /// By all that parts them, as text.
     known: HashMap<String, usize>,
@@ -80,7 +80,7 @@ struct Textures {
 struct Translation<'a> {
     settings: &'a MtlSettings<'a>,
     notes: MtlNotes,
-    textures: Textures,
+    textures: MtlTextures,
 }
 
 impl Translation<'_> {
@@ -195,7 +195,7 @@ impl Translation<'_> {
         }
         let Some(picture) = material.maps.get(&MtlMap::D) else {
             if alpha == 0.0 {
-                let message = format!("{written} makes the material {:?} invisible", material.name);
+                let message = format!("{written} makes the material {} invisible", shown(material.name.as_bytes()));
                 self.notes.add("invisible", line, message, "d 1 is opaque; some programs take Tr for d");
             }
             let mode = if alpha < 1.0 { AlphaMode::Blend } else { AlphaMode::Opaque };
@@ -209,7 +209,8 @@ impl Translation<'_> {
         let channel = if has_alpha { Channel::A } else { Channel::Luminance };
         let mut param = self.textured(picture, alpha, [0.0, 1.0], channel);
         if param.channel == Channel::A && !has_alpha {
-            let message = format!("{:?} has no alpha that could be read: its luminance is taken", picture.file);
+            let file = shown(picture.file.as_bytes());
+            let message = format!("{file} has no alpha that could be read: its luminance is taken");
             self.notes.add("no alpha", picture.line, message, "-imfchan m takes the alpha of a picture");
             param.channel = Channel::Luminance;
         }
@@ -418,9 +419,8 @@ mod tests {
 
     #[test]
     fn maps_are_multiplied_with_their_factors() {
-        let (_, all) = one(
-            "Kd 0 0 0\nKs 0.5\nmap_Kd a.png\nmap_Ks -mm 0 0.5 a.png\nNs 20\nmap_Ns -imfchan g -mm 0.1 0.9 n.png\nmap_Ke a.png",
-        );
+        let (_, all) = one("Kd 0 0 0\nKs 0.5\nmap_Kd a.png\nmap_Ks -mm 0 0.5 a.png\nNs 20\n\
+             map_Ns -imfchan g -mm 0.1 0.9 n.png\nmap_Ke a.png");
         let MaterialDesc::Phong(phong) = &all.materials[0].1 else { panic!() };
         assert_eq!((&phong.diffuse, &phong.specular), (&textured("m/a.png", 1.0), &textured("m/a.png", 0.25)));
         assert_eq!(phong.common.emissive, textured("m/a.png", 1.0));
@@ -466,7 +466,7 @@ mod tests {
         assert_eq!(alpha("Tr 0.25"), (0.75, AlphaMode::Blend, 0));
         assert_eq!(alpha("d 1\nTr 1"), (1.0, AlphaMode::Opaque, 1));
         assert_eq!(alpha("Tr 1"), (0.0, AlphaMode::Blend, 1));
-        assert_eq!(messages(&one("Tr 1").1), ["Tr 1 makes the material \"a\" invisible"]);
+        assert_eq!(messages(&one("Tr 1").1), ["Tr 1 makes the material `a` invisible"]);
         // By a map: the alpha of what has one
         let of_map = |text: &str, has_alpha: Option<bool>| {
             let settings = MtlSettings { has_alpha: &move |_| has_alpha, ..SETTINGS };

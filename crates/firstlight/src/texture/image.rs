@@ -52,8 +52,8 @@ words! {
 }
 
 table! {
-    /// A picture: PNG, JPEG, WebP, TGA, BMP, GIF, TIFF, QOI, PNM, Radiance HDR or OpenEXR. Row 0 of the picture is v = 1;
-    /// texel centres are at (i + 1/2) / width. Its coordinate is uv x scale, turned by `rotate_deg`, + offset.
+    /// A picture: PNG, JPEG, WebP, TGA, BMP, GIF, TIFF, QOI, PNM, Radiance HDR or OpenEXR. Row 0 of the picture is
+    /// v = 1; texel centres are at (i + 1/2) / width. Its coordinate is uv x scale, turned by `rotate_deg`, + offset.
     ///
     /// ```toml
     /// [texture.image.bricks]
