@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use firstlight::{
-    AssetError, Assets, CompileOptions, Compiled, FolderAssets, Framing, MeshFormat, ModelSettings, NoAssets, Parsed,
-    SceneDesc, UpAxis, builtin_scenes, is_point_set,
+    AssetError, Assets, CompileCache, CompileOptions, Compiled, FolderAssets, Framing, MeshFormat, ModelSettings,
+    NoAssets, Parsed, SceneDesc, UpAxis, builtin_scenes, is_point_set,
 };
 
 use crate::args::{Axis, ReadingArgs};
@@ -42,6 +42,8 @@ pub struct Input {
     assets: Remembered,
     strict: bool,
     texture_memory: Option<u32>,
+    /// What one compilation leaves to the next.
+    cache: Option<CompileCache>,
 }
 
 /// The files of a scene, kept once they were read.
@@ -139,8 +141,8 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
 fn refuse_options_of_models(scene: &Path, reading: &ReadingArgs) -> Result<(), Failure> {
     for (option, said) in [("--smooth", reading.smooth.is_some()), ("--up", reading.up.is_some())] {
         if said && !is_model(scene) {
-            let scene = shown(scene);
-            return Err(Failure::Usage(format!("{option} is for models, and {scene} is none (.ply, .stl, .obj)")));
+            let (scene, endings) = (shown(scene), model_endings());
+            return Err(Failure::Usage(format!("{option} is for models, and {scene} is none ({endings})")));
         }
     }
     Ok(())
@@ -168,6 +170,7 @@ fn read_text(
         assets,
         strict: reading.strict,
         texture_memory: reading.texture_memory,
+        cache: None,
     })
 }
 
@@ -177,10 +180,59 @@ fn folder_assets(folder: &Path, reading: &ReadingArgs) -> Result<FolderAssets, F
         .map_err(|(path, e)| Failure::Work(format!("--allow-dir: {}: {e}", shown(&path))))
 }
 
+/// The endings of models.
+pub const MODEL_ENDINGS: [&str; 3] = ["ply", "stl", "obj"];
+
+/// `.ply, .stl, .obj`
+fn model_endings() -> String {
+    MODEL_ENDINGS.map(|ending| format!(".{ending}")).join(", ")
+}
+
 /// Whether `scene` names a model, by its ending.
 fn is_model(scene: &Path) -> bool {
     let ending = scene.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-    matches!(ending.as_deref(), Some("ply" | "stl" | "obj"))
+    ending.is_some_and(|ending| MODEL_ENDINGS.contains(&&*ending))
+}
+
+/// The scenes that are meant: as they are given, and in the place of a folder the models in it and in the folders below
+/// it, in the order of the bytes of their paths. Names that begin with a dot are left out, and links to folders are not
+/// followed. A folder stays where there are none, or where it cannot be read: that is told when it is its turn.
+pub fn with_folders(scenes: &[PathBuf]) -> Vec<PathBuf> {
+    let is_folder = |scene: &PathBuf| file_of(scene).is_some_and(Path::is_dir);
+    scenes.iter().flat_map(|scene| if is_folder(scene) { models_in(scene) } else { vec![scene.clone()] }).collect()
+}
+
+fn models_in(folder: &Path) -> Vec<PathBuf> {
+    let (mut found, mut folders) = (Vec::new(), vec![folder.to_path_buf()]);
+    while let Some(folder) = folders.pop() {
+        let Ok(entries) = std::fs::read_dir(&folder) else {
+            found.push(folder);
+            continue;
+        };
+        for entry in entries.flatten().filter(|entry| !entry.file_name().as_encoded_bytes().starts_with(b".")) {
+            let path = entry.path();
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                folders.push(path);
+            } else if is_model(&path) && !path.is_dir() {
+                found.push(path);
+            }
+        }
+    }
+    found.sort_by(|a, b| a.as_os_str().as_encoded_bytes().cmp(b.as_os_str().as_encoded_bytes()));
+    if found.is_empty() { vec![folder.to_path_buf()] } else { found }
+}
+
+/// Why a folder is no scene: that it cannot be read, or that it has no models.
+pub fn fault_of_folder(folder: &Path) -> Failure {
+    let name = shown(folder);
+    Failure::Work(match std::fs::read_dir(folder) {
+        Err(e) => format!("{name}: {e}"),
+        Ok(_) => format!(
+            "{name}: no file in this folder or below ends in {}; hidden files and folders are left out, and links to \
+             folders are not followed",
+            model_endings()
+        ),
+    })
 }
 
 /// Whether these are the first bytes of a mesh file; of a binary STL file, all of its bytes.
@@ -224,6 +276,7 @@ fn read_model(path: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
         assets: Remembered { model: Some((called, file)), ..assets },
         strict: reading.strict,
         texture_memory: reading.texture_memory,
+        cache: None,
     })
 }
 
@@ -245,6 +298,7 @@ fn piped_model(name: &str, own: Option<PathBuf>, bytes: Vec<u8>, reading: &Readi
         assets,
         strict: reading.strict,
         texture_memory: reading.texture_memory,
+        cache: None,
     }
 }
 
@@ -268,10 +322,19 @@ pub fn names_of(scene: &Path) -> Names {
     let builtin_or_stdin = file_of(scene).is_none();
     let whole = |part: Option<&OsStr>| part.map_or_else(|| OsString::from("scene"), OsStr::to_owned);
     if scene == "-" {
-        return Names { stem: whole(None), name: whole(None) };
+        return Names { stem: whole(None), name: whole(None), parent: whole(None) };
     }
     let name = whole(scene.file_name());
-    Names { stem: if builtin_or_stdin { name.clone() } else { whole(scene.file_stem()) }, name }
+    if builtin_or_stdin {
+        return Names { stem: name.clone(), name, parent: whole(None) };
+    }
+    // As it was written, and of the working folder what it is called
+    let folder = scene.parent().unwrap_or(Path::new(""));
+    let parent = folder.file_name().map(OsStr::to_owned).or_else(|| {
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        folder.canonicalize().ok().and_then(|folder| folder.file_name().map(OsStr::to_owned))
+    });
+    Names { stem: whole(scene.file_stem()), name, parent: whole(parent.as_deref()) }
 }
 
 /// No course file that anybody writes is longer, in bytes.
@@ -316,6 +379,12 @@ impl Input {
         self.assets.again = true;
     }
 
+    /// Keeps what is dear to make of them as well: for other cameras and sizes nothing of it is made again.
+    pub fn remember_all(&mut self) {
+        self.remember_files();
+        self.cache = Some(CompileCache::default());
+    }
+
     /// Compiles the description as it is now, at `time` in seconds. Files are read the first time only: a scene has the
     /// same textures in all its frames. What takes its time is told, unless `quiet`.
     ///
@@ -329,7 +398,7 @@ impl Input {
             framing: self.framing,
             light: self.is_model,
             progress,
-            cache: None,
+            cache: self.cache.clone(),
             texture_memory: self.texture_memory.map(|mib| u64::from(mib) << 20),
         };
         self.parsed.compile(&self.assets, &options).map_err(|e| Failure::Scene(e.faults))

@@ -433,7 +433,7 @@ mod tests {
             let mut parsed = Parsed::of_model("a.obj", "a.obj", &ModelSettings::default());
             parsed.desc.render.antialiasing = antialiasing;
             (parsed.desc.render.width, parsed.desc.render.height) = (32, 32);
-            let framing = Framing { view: View::from_name("right").expect("is one"), margin: 0.1 };
+            let framing = Framing { view: View::from_name("right").expect("is one"), margin: 0.1, distance: None };
             let options = CompileOptions { light: true, framing, ..CompileOptions::default() };
             let compiled = parsed.compile(&assets, &options).unwrap_or_else(|error| panic!("{error}"));
             compiled.advice.iter().map(ToString::to_string).collect::<Vec<_>>()

@@ -180,10 +180,14 @@ impl SceneDesc {
         materials: &[Material],
         geometry: Option<&Geometry>,
     ) -> Added {
-        let Framing { view, margin } = options.framing;
+        let Framing { view, margin, distance } = options.framing;
         cx.between("view.azimuth_deg", view.azimuth_deg, -360.0, 360.0, Some("in degrees; 0 is in front"));
         cx.between("view.elevation_deg", view.elevation_deg, -90.0, 90.0, Some("in degrees; 90 is straight above"));
         cx.between("margin", margin, 0.0, Framing::MAX_MARGIN, Some("a part of the picture's shorter side"));
+        if let Some(distance) = distance {
+            let [least, most] = Framing::DISTANCES;
+            cx.between("distance", distance, least, most, Some("from the middle of what is seen, in metres"));
+        }
         if cx.has_errors() {
             return Added::default();
         }
