@@ -42,6 +42,8 @@ pub struct Input {
     assets: Remembered,
     strict: bool,
     texture_memory: Option<u32>,
+    /// Bytes that it may take.
+    pub memory: Option<u64>,
     /// What one compilation leaves to the next.
     cache: Option<CompileCache>,
 }
@@ -170,6 +172,7 @@ fn read_text(
         assets,
         strict: reading.strict,
         texture_memory: reading.texture_memory,
+        memory: None,
         cache: None,
     })
 }
@@ -276,6 +279,7 @@ fn read_model(path: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
         assets: Remembered { model: Some((called, file)), ..assets },
         strict: reading.strict,
         texture_memory: reading.texture_memory,
+        memory: None,
         cache: None,
     })
 }
@@ -298,6 +302,7 @@ fn piped_model(name: &str, own: Option<PathBuf>, bytes: Vec<u8>, reading: &Readi
         assets,
         strict: reading.strict,
         texture_memory: reading.texture_memory,
+        memory: None,
         cache: None,
     }
 }
@@ -399,6 +404,7 @@ impl Input {
             light: self.is_model,
             progress,
             cache: self.cache.clone(),
+            memory: self.memory,
             texture_memory: self.texture_memory.map(|mib| u64::from(mib) << 20),
         };
         self.parsed.compile(&self.assets, &options).map_err(|e| Failure::Scene(e.faults))

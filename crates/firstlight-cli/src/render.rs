@@ -96,9 +96,11 @@ fn render_pictures(plan: &Plan, job: &Job, reading: &ReadingArgs, summary: &mut 
     if input::file_of(&job.scene).is_some_and(|scene| scene.is_dir()) {
         return Err(input::fault_of_folder(&job.scene));
     }
+    let began = Instant::now();
     // Read the scene, and bring it together with the arguments
     let (input, parse) = timed(|| input::read(&job.scene, reading));
     let mut input = input?;
+    input.memory = plan.max_memory;
     let joined = plan.join(job, &mut input)?;
     plan.check_buffers(&joined.outputs, &input.parsed.desc.render.buffers)?;
     let mut moments = plan.moments(job, &input, &joined)?;
@@ -134,11 +136,14 @@ fn render_pictures(plan: &Plan, job: &Job, reading: &ReadingArgs, summary: &mut 
         beside: &beside,
         coco: coco.map(|target| (Coco::new(), target)),
         progress: None,
+        deadline: None,
         warned: Vec::new(),
     };
     let mut took: Option<Took> = None;
     for (index, moment) in moments.iter().enumerate() {
         run.summary.picture(&name, &moment.outputs);
+        let begins = if index == 0 { began } else { Instant::now() };
+        run.deadline = plan.max_time.and_then(|time| begins.checked_add(time));
         let done = match ready.take() {
             Some(ready) => run.render(index, &moments, ready),
             None => moment.ready().and_then(|ready| run.render(index, &moments, ready)),

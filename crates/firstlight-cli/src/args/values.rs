@@ -136,6 +136,11 @@ pub(super) fn shard(text: &str) -> Result<Shard, String> {
     }
 }
 
+/// Reads how long a picture may take.
+pub(super) fn limit_of_time(text: &str) -> Result<f64, String> {
+    number(text, 1e-3..=1e9, "a number of seconds from 0.001 to 1e9 is needed")
+}
+
 /// Reads the largest difference that is allowed.
 pub(super) fn limit(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use firstlight::{
     AaMode, Coco, Diagnostic, Display, Framing, Plane, RenderSettings, RenderStats, SamplesDesc, Scene, Severity,
@@ -96,6 +96,10 @@ fn picture_name(outputs: &[Output], json: &Target) -> String {
     up.chain(down).collect::<Vec<String>>().join("/")
 }
 
+fn is_past(deadline: Option<Instant>) -> bool {
+    deadline.is_some_and(|deadline| Instant::now() >= deadline)
+}
+
 /// The rendering of one moment after the other.
 pub(super) struct Run<'a> {
     pub plan: &'a Plan<'a>,
@@ -106,6 +110,8 @@ pub(super) struct Run<'a> {
     pub beside: &'a [JsonFile],
     /// The annotations so far, if they are asked for, and where they go.
     pub coco: Option<(Coco, Target)>,
+    /// When the picture has to be there.
+    pub deadline: Option<Instant>,
     /// Once there is something to render.
     pub progress: Option<Progress>,
     /// What has been said already.
@@ -152,7 +158,9 @@ impl Run<'_> {
         }
         let settings = &RenderSettings { buffers, ..settings.clone() };
         settings.check(scene).map_err(Failure::Usage)?;
+        self.check_memory(scene, settings)?;
         settings.check_memory(scene).map_err(Failure::Work)?;
+        self.check_time()?;
 
         // Render, until somebody asks to stop
         let watch = Watch::begin();
@@ -163,13 +171,18 @@ impl Run<'_> {
         };
         let progress = &*self.progress.get_or_insert_with(begin);
         progress.picture(index as u64, pixels(&moments[..index]));
+        let deadline = self.deadline;
         let (rendered, render) = timed(|| {
             firstlight::render(scene, settings, &|done, _| {
                 progress.update(done);
-                watch.flow()
+                if is_past(deadline) { ControlFlow::Break(()) } else { watch.flow() }
             })
         });
-        let ControlFlow::Continue((film, rays)) = rendered else { return Err(Failure::Interrupted) };
+        let ControlFlow::Continue((film, rays)) = rendered else {
+            watch.check()?;
+            self.check_time()?;
+            return Err(Failure::Interrupted);
+        };
         if index + 1 == moments.len() {
             progress.finish(&plan.in_words(moments));
         }
@@ -204,6 +217,33 @@ impl Run<'_> {
 }
 
 impl Run<'_> {
+    /// Sees that there is time left.
+    fn check_time(&self) -> Result<(), Failure> {
+        let Some(time) = self.plan.max_time.filter(|_| is_past(self.deadline)) else { return Ok(()) };
+        let (name, seconds) = (&self.input.name, time.as_secs_f64());
+        Err(Failure::Work(format!(
+            "{name}: --max-time {seconds}: the picture was not done after {seconds} s, and none was written; allow more, \
+             or render faster: fewer pixels (--size), fewer camera rays (--aa), a larger --tolerance"
+        )))
+    }
+
+    /// Sees that there is memory for the picture beside the scene.
+    fn check_memory(&self, scene: &Scene, settings: &RenderSettings) -> Result<(), Failure> {
+        let Some(most) = self.plan.max_memory else { return Ok(()) };
+        let summary = scene.summary();
+        let own = summary.geometry_bytes.iter().sum::<u64>() + summary.texture_bytes;
+        let film = settings.film_bytes(scene);
+        if own + film <= most {
+            return Ok(());
+        }
+        let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+        let (name, most, own, film, all) = (&self.input.name, most >> 20, mib(own), mib(film), mib(own + film));
+        Err(Failure::Work(format!(
+            "{name}: --max-memory {most}: the scene takes {own} MiB and the picture with its buffers {film} MiB; allow \
+             --max-memory {all}, or render fewer pixels (--size) or a part of them (--crop)"
+        )))
+    }
+
     /// What there is to say where a moment was asked for and nothing changes with time.
     fn advice_on_time(&self, scene: &Scene) -> Option<Diagnostic> {
         let message = match (self.plan.pictures.frames, scene.time()) {

@@ -4,6 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::iter;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use firstlight::{
     AaMode, BufferDesc, FileSettings, Format, Framing, Plane, RenderSettings, ShadowTerminator, SimdLevel, View, Window,
@@ -49,6 +50,10 @@ pub(super) struct Plan<'a> {
     /// Those of each scene.
     pub pictures: Pictures,
     pub shard: Option<Shard>,
+    /// How long a picture may take.
+    pub max_time: Option<Duration>,
+    /// Bytes that a scene and its picture may take.
+    pub max_memory: Option<u64>,
     pub quiet: bool,
 }
 
@@ -212,6 +217,8 @@ impl<'a> Plan<'a> {
             time: args.time.unwrap_or(0.0),
             pictures,
             shard: args.shard,
+            max_time: args.max_time.map(Duration::from_secs_f64),
+            max_memory: args.max_memory.map(|mib| u64::from(mib) << 20),
             quiet,
         };
         if several {

@@ -362,3 +362,60 @@ fn memory_does_not_grow_with_the_number_of_files() {
     // Names of files are kept: half a kilobyte for each. Nothing of their content is
     assert!(many < few + (4 << 20) && many < 64 << 20, "{few} {many}");
 }
+
+#[test]
+fn a_picture_that_takes_too_long_is_none_and_the_others_go_on() {
+    let folder = with_set();
+    folder.put("scene.toml", SCENE);
+    let slow = "--width 2000 --aa 8 --samples 100000 --visibility traced";
+    let run = folder.run(&format!("render scene.toml {slow} -o out/slow.png --max-time 0.2")).exits(1);
+    run.says(&["scene.toml: --max-time 0.2: the picture was not done after 0.2 s, and none was written"]);
+    assert!(below(&folder, "out").is_empty());
+    // A limit of each picture, not of the run, and what is done in time is the same as without
+    let line = "render scene.toml set/chairs --size 60 --aa 2 -o out/{name}.png";
+    folder.run(&format!("{line} --max-time 1e6")).done();
+    let without = folder.get("out/a.stl.png");
+    folder.run(line).done();
+    assert_eq!(folder.get("out/a.stl.png"), without);
+    for bad in ["0", "-1", "inf", "soon"] {
+        let output = folder.command(["render", "scene.toml", &format!("--max-time={bad}")]).output().unwrap();
+        crate::common::ran(output).exits(2).says(&["a number of seconds from 0.001 to 1e9 is needed"]);
+    }
+}
+
+#[test]
+fn what_takes_too_much_memory_is_refused_before_it_is_taken() {
+    let folder = with_set();
+    // The picture
+    let line = "render set/chairs/a.stl -o out/a.png --aa 1 --max-memory 2";
+    folder.run(&format!("{line} --size 400")).exits(1).says(&["set/chairs/a.stl: --max-memory 2: the scene takes"]);
+    assert!(below(&folder, "out").is_empty());
+    folder.run(&format!("{line} --size 40")).done();
+    // Triangles: 20,000 of them are more than 2 MiB with their tree
+    let mut many = stl(1.0);
+    let one = many[84..].to_vec();
+    for i in 0..5000u32 {
+        let mut moved = one.clone();
+        for facet in moved.chunks_exact_mut(50) {
+            facet[12..16].copy_from_slice(&(i as f32).to_le_bytes());
+        }
+        many.extend(moved);
+    }
+    many[80..84].copy_from_slice(&20_004u32.to_le_bytes());
+    folder.put("many.stl", &many);
+    let words = ["many.stl", "MiB of memory", "this mesh and its tree", "may take 2 MiB", "allow more: --max-memory 3"];
+    folder.run("render many.stl -o out/m.png --size 40 --aa 1 --max-memory 2").exits(1).says(&words);
+    folder.run("render many.stl -o out/m.png --size 40 --aa 1 --max-memory 4").done();
+    // The file itself
+    folder.put("text.obj", format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n{}", "# nothing\n".repeat(120_000)));
+    folder.run("render text.obj -o out/t.png --size 40 --aa 1 --max-memory 1").exits(1).says(&[
+        "text.obj",
+        "the file",
+        "allow more: --max-memory 2",
+    ]);
+    // One of several goes on
+    let run = folder.run("render many.stl set/chairs/b.STL -o out/{stem}.png --size 40 --aa 1 --max-memory 2").exits(1);
+    run.says(&["1 of 2 scenes were rendered"]);
+    assert!(below(&folder, "out").contains(&"b.png".into()));
+    folder.run("render many.stl --max-memory 0").exits(2).says(&["a whole number from 1 to 16777216 is needed"]);
+}

@@ -14,7 +14,7 @@ use super::occluders::ListedOccluders;
 use super::outline::ShapeOutline;
 use super::place::compile_shapes;
 use super::seen_lights::SeenLights;
-use super::textures::{TextureRequests, Textures};
+use super::textures::{TEXTURE_MEMORY, TextureRequests, Textures};
 use super::{Choices, DisplayEncoding, RenderDesc, Scene, SceneDesc, SceneSummary};
 use crate::camera::{Camera, CameraDesc};
 use crate::color::{Display, Encoding, Rgb, ToneMapping};
@@ -43,6 +43,9 @@ pub struct CompileOptions {
     /// Bytes that pictures may take as textures, with their smaller copies; [`TEXTURE_MEMORY`](crate::TEXTURE_MEMORY)
     /// where it is `None`.
     pub texture_memory: Option<u64>,
+    /// Bytes that files, meshes, point sets and textures may take together, as far as that is known before they are made;
+    /// any number of bytes where it is `None`.
+    pub memory: Option<u64>,
     /// In seconds, from -1e9 to 1e9: where the scene has keys, it is compiled as it is at this time.
     pub time: f64,
 }
@@ -105,12 +108,15 @@ impl SceneDesc {
             cache.begin();
         }
         cx.progress = options.progress.clone();
+        cx.memory = options.memory;
         cx.between("time", time, -MAX_TIME, MAX_TIME, Some("the moment to compile, in seconds"));
         let picture = self.compile_render(cx);
-        let mut textures = TextureRequests::new(self, assets, cache, options.texture_memory);
+        let most = options.texture_memory.unwrap_or(TEXTURE_MEMORY).min(options.memory.unwrap_or(u64::MAX));
+        let mut textures = TextureRequests::new(self, assets, cache, Some(most));
         textures.check(cx);
         let materials = self.compile_materials(cx, &mut textures);
         let textures = textures.finish(cx);
+        cx.take("texture", "textures", textures.bytes);
         let mut files = MeshFiles { cache, ..MeshFiles::default() };
         let geometry = compile_shapes(self, &materials, cx, assets, &mut files);
         let origin = cx.origin;

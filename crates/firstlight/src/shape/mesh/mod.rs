@@ -74,13 +74,18 @@ pub(crate) fn read_mesh_bytes(
     file: &FilePath,
     files: &mut MeshFiles<'_>,
 ) -> Option<(Vec<u8>, ContentKey)> {
-    let bytes = match assets.read(&file.0, MAX_MESH_FILE) {
+    let left = cx.memory_left();
+    let bytes = match assets.read(&file.0, MAX_MESH_FILE.min(left)) {
         Ok(bytes) => bytes,
         Err(error) => {
             let colon = if matches!(error, AssetError::NotFound | AssetError::Io(_)) { ":" } else { "" };
             let hint = match error {
                 AssetError::NotFound => "file names are relative to the text that names them",
                 AssetError::Outside => "copy it into the folder of the scene, or allow its folder with --allow-dir",
+                AssetError::TooLarge { size, .. } if left < MAX_MESH_FILE => {
+                    cx.take("file", &format!("the file {:?}", file.0), size);
+                    return None;
+                }
                 AssetError::TooLarge { .. } => "split it",
                 AssetError::Io(_) => "a mesh is a plain file that can be read",
             };
