@@ -314,7 +314,7 @@ fn a_model_of_which_nothing_is_seen_is_no_picture() {
     };
     // A face without an area, and one that no camera ray of so few meets
     folder.put("flat.ply", ply("0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n", 1));
-    folder.put("thin.ply", ply("0 0 0\n1 1 0\n1.0001 1 0\n3 0 1 2\n", 1));
+    folder.put("thin.ply", ply("0 0 0\n1 0.37 0\n1.0001 0.37 0\n3 0 1 2\n", 1));
     folder.put("good.ply", ply("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", 1));
     for name in ["flat", "thin"] {
         let run = folder.run(&format!("render {name}.ply --view front --size 8 --aa 1 -o a.png")).exits(1);

@@ -474,4 +474,44 @@ mod tests {
         assert_eq!(View::new(90.0, 90.0).directions(), [DVec3::Y, DVec3::NEG_X]);
         assert_eq!(View::from_name("above"), None);
     }
+
+    #[test]
+    fn a_turntable_holds_what_is_seen_from_all_its_sides() {
+        let points = [[3.0, 0.0, 0.2], [-1.0, 2.0, 0.0], [0.5, -1.0, -0.1], [2.0, 1.0, 0.3]].map(DVec3::from);
+        let low = points.iter().copied().reduce(DVec3::min).unwrap_or_default();
+        let high = points.iter().copied().reduce(DVec3::max).unwrap_or_default();
+        let support = |d: DVec3| points.iter().map(|p| p.dot(d)).fold(f64::NEG_INFINITY, f64::max);
+        for (first, count, size) in [
+            (View::default(), 7, [300.0, 300.0]),
+            (View::new(-350.0, -40.0), 4, [400.0, 100.0]),
+            (View::new(0.0, 90.0), 3, [9.0, 9.0]),
+        ] {
+            let framing = Framing { view: first, margin: 0.1, distance: None };
+            let of = |number| Framing { view: first.turned(number, count), ..framing };
+            let all = (0..count).map(|number| Aim::new(&support, [low, high], &of(number), size).distance());
+            let distance = all.fold(0.0, f64::max);
+            let free = [0, 1].map(|axis| 0.1 * size[0].min(size[1]) / size[axis]);
+            let mut least = f64::INFINITY;
+            for number in 0..count {
+                let camera =
+                    framing_of(&support, [low, high], &Framing { distance: Some(distance), ..of(number) }, size);
+                let middle = (low + high) * 0.5;
+                assert!((DVec3::from(camera.look_at) - middle).length() < 1e-12);
+                assert!(((DVec3::from(camera.position) - middle).length() - distance).abs() < 1e-12 * distance);
+                let [x, y] = shown(&camera, &points, size);
+                for ([a, b], free) in [x, y].into_iter().zip(free) {
+                    least = least.min(a - free).min(1.0 - b - free);
+                }
+            }
+            // No nearer eye would do
+            assert!((-1e-9..1e-9).contains(&least), "{first:?} {size:?}: {least}");
+        }
+    }
+
+    #[test]
+    fn a_turntable_goes_all_around() {
+        let view = View::new(300.0, 10.0);
+        assert_eq!([0, 1, 2, 3].map(|k| view.turned(k, 4).azimuth_deg), [300.0, 30.0, 120.0, 210.0]);
+        assert_eq!((view.turned(4, 4), view.turned(7, 0).elevation_deg), (view, 10.0));
+    }
 }
