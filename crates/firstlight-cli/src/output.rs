@@ -133,12 +133,10 @@ impl JsonFile {
     /// # Errors
     /// It has one, and is one file of all scenes.
     pub fn refuse_placeholders(&self) -> Result<(), Failure> {
-        let words = WORDS.iter().map(|(word, _)| *word).chain([VIEW, SIZE]);
-        for word in words.filter(|word| self.target.has(word)) {
-            let name = self.name();
-            return Err(Failure::Usage(format!("{name}: {word} stands for nothing: it is one file of all scenes")));
-        }
-        Ok(())
+        let mut words = WORDS.iter().map(|(word, _)| *word).chain([VIEW, SIZE]);
+        let Some(word) = words.find(|word| self.target.has(word)) else { return Ok(()) };
+        let name = self.name();
+        Err(Failure::Usage(format!("{name}: {word} stands for nothing: it is one file of all scenes")))
     }
 
     /// With the names of a scene in place of the placeholders.

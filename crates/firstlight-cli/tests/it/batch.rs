@@ -206,7 +206,7 @@ fn each_of_several_views_is_the_picture_of_that_view() {
     }
     folder.run(&format!("render set/chairs/a.stl -o out/one.exr {quick}")).done();
     assert_eq!(folder.get("out/one.exr"), folder.get("out/three-quarter_a.exr"));
-    folder.run(&format!("verify out/top_a.exr --scene set/chairs/a.stl")).done();
+    folder.run("verify out/top_a.exr --scene set/chairs/a.stl").done();
 }
 
 #[test]
