@@ -10,7 +10,7 @@ use firstlight::{
 };
 
 use values::*;
-pub use values::{Frames, Shard, Size, color};
+pub use values::{Frames, NamedView, Shard, Size, color};
 
 /// The version and, where it is known, the commit: `0.1.0 (0123456789)`.
 const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("FIRSTLIGHT_COMMIT"));
@@ -85,6 +85,12 @@ Examples:
       from another side, for a page of any colour
   firstlight render models/*.ply plan.toml -o 'out/{stem}.png' --size 256
       many pictures in one call
+  firstlight render models/ -o 'out/{parent}-{name}.png' --size 128,512 --summary out/log.jsonl
+      all models of a folder and of those below, in two sizes, with a line of JSON for each picture
+  firstlight render bunny.ply --views front,side,top,iso -o 'bunny-{view}.png'
+      from four sides
+  firstlight render bunny.ply --turntable 36 -o 'turn_##.png'
+      from all around
   firstlight render bunny.ply --print-scene > bunny.toml
       the same as a scene, to go on from
   firstlight render room.toml --width 320 --aa 1 --samples 16
@@ -276,18 +282,22 @@ fn angle(text: &str) -> Result<f64, String> {
 pub struct RenderArgs {
     /// A scene file (.toml, .json, or a course file .txt), a model (.ply, .stl, .obj), the name of a built-in scene
     /// such as config23 (see `firstlight scenes`; a file of such a name is ./config23), or - for standard input, a
-    /// scene or a model. Several are rendered one after the other, also after one that failed
+    /// scene or a model. A folder stands for the models in it and in the folders below, sorted by their paths, without
+    /// hidden ones and what lies behind links to folders. Several are rendered one after the other, also after one that
+    /// failed
     #[arg(value_name = "SCENE", value_hint = ValueHint::FilePath, default_value = "config11")]
     pub scenes: Vec<PathBuf>,
     #[command(flatten)]
     pub reading: ReadingArgs,
 
-    /// A picture to write: its ending, .png, .jpg, .exr, .npz, .npy or .hdr, says the format; - is standard output.
-    /// With NAME= before it, one buffer by itself, as in depth=depth.png (`firstlight buffers` lists them all),
-    /// rendered whatever --buffers says; a file whose own name has a = is written as ./a=b.png. {stem} in it is the
-    /// scene's file name without its ending, {name} the whole of it; with several scenes one of them is needed, in
-    /// --heat and --stats too. May be given several times [default: the scene's name with .png, or with .render.png
-    /// where that is a file not written by firstlight; a course file's output_file; in the working folder]
+    /// A picture to write: its ending, .png, .jpg, .exr, .npz, .npy or .hdr, says the format; - is standard output. With
+    /// NAME= before it, one buffer by itself, as in depth=depth.png (`firstlight buffers` lists them all), rendered
+    /// whatever --buffers says; a file whose own name has a = is written as ./a=b.png. {stem} in it is the scene's file
+    /// name without its ending, {name} the whole of it, {parent} the name of its folder; with several scenes one of
+    /// them is needed, in --heat and --stats too. {view} and {size} are those of several views and sizes. Folders are
+    /// there already, but for those that a placeholder names. May be given several times [default: the
+    /// scene's name with .png, or with .render.png where that is a file not written by firstlight; a course file's
+    /// output_file; in the working folder]
     #[arg(short, long = "output", value_name = "[NAME=]FILE", value_hint = ValueHint::FilePath)]
     #[arg(help_heading = "Output")]
     pub output: Vec<PathBuf>,
@@ -334,10 +344,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "PIXELS", value_parser = whole::<u32>(1, 65536), help_heading = "Picture")]
     pub height: Option<u32>,
     /// Pixels along the longer side, in the scene's aspect ratio (a model by itself is square), or WIDTHxHEIGHT; 1 to
-    /// 65536 each [default: the scene's]
-    #[arg(long, value_name = "PIXELS", value_parser = size, help_heading = "Picture")]
+    /// 65536 each. Several, with commas between, are pictures of their own: {size} in a name says which, without it
+    /// a.png becomes a.512.png [default: the scene's]
+    #[arg(long, value_name = "PIXELS", value_parser = size, value_delimiter = ',', help_heading = "Picture")]
     #[arg(conflicts_with_all = ["width", "height"])]
-    pub size: Option<Size>,
+    pub size: Vec<Size>,
     /// Leaves what no surface covers transparent [default: as the scene has it]
     #[arg(long, conflicts_with = "background", help_heading = "Picture")]
     pub transparent: bool,
@@ -345,11 +356,22 @@ pub struct RenderArgs {
     /// (linear, 0 to 1e6, as in scene text) [default: the scene's]
     #[arg(long, value_name = "COLOR", value_parser = color, allow_hyphen_values = true, help_heading = "Picture")]
     pub background: Option<ColorDesc>,
-    /// Where the camera of a model, or of a scene without a camera, looks from: front, back, left, right, top, bottom,
-    /// iso, or AZIMUTH,ELEVATION in degrees; 0,0 is in front, on the side of +z, 90,0 on the right, on that of +x
-    /// [default: 25,18]
+    /// Where the camera of a model, or of a scene without a camera, looks from: front, back, left, right or side, top,
+    /// bottom, iso, three-quarter, or AZIMUTH,ELEVATION in degrees; 0,0 is in front, on the side of +z, 90,0 on the
+    /// right, on that of +x [default: three-quarter, which is 25,18]
     #[arg(long, value_name = "VIEW", value_parser = view, allow_hyphen_values = true, help_heading = "Picture")]
     pub view: Option<View>,
+    /// Several such views by their names, with commas between, each a picture of its own: {view} in a name says which,
+    /// without it a.png becomes a.front.png [default: one picture]
+    #[arg(long, value_name = "NAMES", value_parser = named_view, value_delimiter = ',', help_heading = "Picture")]
+    #[arg(conflicts_with_all = ["view", "turntable"])]
+    pub views: Vec<NamedView>,
+    /// N such views, 1 to 10000, around the y axis, from --view on towards the right, all from one distance: N pictures
+    /// of their own, with numbers from 0 on. {view} in a name is the number, or the last row of #; without them a.png
+    /// becomes a.0000.png [default: one picture]
+    #[arg(long, value_name = "N", value_parser = whole::<u32>(1, 10_000), help_heading = "Picture")]
+    #[arg(conflicts_with = "frames")]
+    pub turntable: Option<u32>,
     /// What such a camera leaves free at least on each side of the picture, as a part of its shorter side, 0 to 0.45
     /// [default: 0.04]
     #[arg(long, value_name = "PART", value_parser = margin, help_heading = "Picture")]
@@ -372,8 +394,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "A..B", value_parser = frames, conflicts_with = "time", help_heading = "Time")]
     pub frames: Option<Frames>,
 
-    /// Renders every N-th of the pictures only, from the I-th on, for job arrays: of all frames of all scenes, in their
-    /// order. All of 1/N to N/N write what one run without it does, under the same names; where there are fewer than N
+    /// Renders every N-th of the pictures only, from the I-th on, for job arrays: of all frames, views and sizes of all
+    /// scenes, in their order. All of 1/N to N/N write what one run without it does, under the same names; where there are fewer than N
     /// pictures, some have nothing to do, which is no error [default: 1/1]
     #[arg(long, value_name = "I/N", value_parser = shard, help_heading = "Output")]
     pub shard: Option<Shard>,
@@ -417,6 +439,17 @@ pub struct RenderArgs {
     #[arg(long, value_name = "LEVEL", value_parser = SimdParser, help_heading = "Work")]
     pub simd: Option<SimdLevel>,
 
+    /// Ends a picture that is not done after so many seconds, 0.001 to 1e9, with an error, and writes nothing of it: with
+    /// its scene where that is read for it. A file that is being read and a tree that is being built are not stopped in
+    /// the middle [default: no limit]
+    #[arg(long = "max-time", value_name = "SECONDS", value_parser = limit_of_time, help_heading = "Work")]
+    pub max_time: Option<f64>,
+    /// Refuses a scene that takes more than so many mebibytes of memory, 1 to 16777216, before they are taken: by the
+    /// sizes of its files, its triangles and points, its textures, and the pixels and buffers of the picture. The program
+    /// itself takes some 20 of its own [default: no limit]
+    #[arg(long = "max-memory", value_name = "MIB", value_parser = whole::<u32>(1, 1 << 24), help_heading = "Work")]
+    pub max_memory: Option<u32>,
+
     /// Says at the end what each stage took, in seconds, rays and bytes: a table on standard error, or JSON in a file
     /// (- is standard output)
     #[arg(long, value_name = "FILE.json", require_equals = true, value_hint = ValueHint::FilePath)]
@@ -431,6 +464,11 @@ pub struct RenderArgs {
     /// each doubling of what a pixel took a step of the same length [default: none]
     #[arg(long, value_name = "FILE.png", value_hint = ValueHint::FilePath, help_heading = "Messages")]
     pub heat: Option<PathBuf>,
+    /// Writes a line of JSON for each picture as soon as it is done or has failed: input, output (a list), seconds,
+    /// warnings (a list) and error (null for none). It is the log of a run, which can be read while it goes on and is
+    /// left by one that is interrupted; - is standard output [default: none]
+    #[arg(long, value_name = "FILE.jsonl", value_hint = ValueHint::FilePath, help_heading = "Messages")]
+    pub summary: Option<PathBuf>,
     /// Renders nothing, and writes the scene as TOML: with what the options say in place of it, with the camera and the
     /// light that were found for it, all in one text. To FILE, or to standard output; the files it names are seen from
     /// there [default: renders]
@@ -439,6 +477,7 @@ pub struct RenderArgs {
     #[arg(conflicts_with_all = ["output", "bits", "format", "quality", "depth_scale", "half", "exposure", "crop"])]
     #[arg(conflicts_with_all = ["time", "frames", "shard", "aa_mode", "reference", "visibility"])]
     #[arg(conflicts_with_all = ["threads", "tile_size", "simd", "stats", "coco", "heat"])]
+    #[arg(conflicts_with_all = ["views", "turntable", "summary"])]
     pub print_scene: Option<Option<PathBuf>>,
     /// Says nothing but errors, warnings (no notes), and --stats where asked for
     #[arg(short, long, help_heading = "Messages")]

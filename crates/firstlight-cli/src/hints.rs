@@ -63,6 +63,14 @@ const OPTIONS: &[(&[&str], &str)] = &[
         &["--array", "--chunk", "--slice", "--num-shards", "--node"],
         "a part of the pictures, for job arrays, is --shard i/n",
     ),
+    (&["--timeout", "--time-limit"], "how long a picture may take is --max-time SECONDS"),
+    (&["--memory", "--memory-limit", "--max-mem"], "how much memory a scene may take is --max-memory MIB"),
+    (&["--recursive", "-R"], "a folder stands for the models in it and in the folders below"),
+    (
+        &["--orbit", "--spin", "--num-views", "--camera-orbit"],
+        "views from all around are --turntable N, from several sides --views front,side,top",
+    ),
+    (&["--log-file", "--report", "--manifest"], "a line of JSON for each picture is --summary FILE.jsonl"),
     (&["--seed"], "none is needed: the picture has the same bits every time"),
     (
         &["--denoise", "--denoiser"],

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use firstlight::{
-    AssetError, Assets, CompileOptions, Compiled, FolderAssets, Framing, MeshFormat, NoAssets, Parsed, SceneDesc,
-    Studio, StudioSettings, UpAxis, builtin_scenes, is_gltf,
+    AssetError, Assets, CompileCache, CompileOptions, Compiled, FolderAssets, Framing, MeshFormat, NoAssets, Parsed,
+    SceneDesc, Studio, StudioSettings, UpAxis, builtin_scenes, is_gltf,
 };
 
 use crate::args::{Axis, LightSource, ModelArgs, ReadingArgs, StudioName, Switch};
@@ -42,6 +42,10 @@ pub struct Input {
     assets: Remembered,
     strict: bool,
     texture_memory: Option<u32>,
+    /// Bytes that it may take.
+    pub memory: Option<u64>,
+    /// What one compilation leaves to the next.
+    cache: Option<CompileCache>,
 }
 
 /// The files of a scene, kept once they were read.
@@ -150,7 +154,7 @@ fn refuse_options_of_models(scene: &Path, reading: &ReadingArgs) -> Result<(), F
     ];
     for (option, said) in options {
         if said && !is_model(scene) {
-            let (scene, endings) = (shown(scene), MODEL_ENDINGS.map(|ending| format!(".{ending}")).join(", "));
+            let (scene, endings) = (shown(scene), model_endings());
             return Err(Failure::Usage(format!("{option} is for models, and {scene} is none ({endings})")));
         }
     }
@@ -179,6 +183,8 @@ fn read_text(
         assets,
         strict: reading.strict,
         texture_memory: reading.texture_memory,
+        memory: None,
+        cache: None,
     })
 }
 
@@ -189,12 +195,58 @@ fn folder_assets(folder: &Path, reading: &ReadingArgs) -> Result<FolderAssets, F
 }
 
 /// The endings of models.
-const MODEL_ENDINGS: [&str; 5] = ["glb", "gltf", "obj", "ply", "stl"];
+pub const MODEL_ENDINGS: [&str; 5] = ["glb", "gltf", "obj", "ply", "stl"];
+
+/// `.glb, .gltf, .obj, .ply, .stl`
+fn model_endings() -> String {
+    MODEL_ENDINGS.map(|ending| format!(".{ending}")).join(", ")
+}
 
 /// Whether `scene` names a model, by its ending.
 fn is_model(scene: &Path) -> bool {
     let ending = scene.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-    ending.is_some_and(|ending| MODEL_ENDINGS.contains(&ending.as_str()))
+    ending.is_some_and(|ending| MODEL_ENDINGS.contains(&&*ending))
+}
+
+/// The scenes that are meant: as they are given, and in the place of a folder the models in it and in the folders below
+/// it, in the order of the bytes of their paths. Names that begin with a dot are left out, and links to folders are not
+/// followed. A folder stays where there are none, or where it cannot be read: that is told when it is its turn.
+pub fn with_folders(scenes: &[PathBuf]) -> Vec<PathBuf> {
+    let is_folder = |scene: &PathBuf| file_of(scene).is_some_and(Path::is_dir);
+    scenes.iter().flat_map(|scene| if is_folder(scene) { models_in(scene) } else { vec![scene.clone()] }).collect()
+}
+
+fn models_in(folder: &Path) -> Vec<PathBuf> {
+    let (mut found, mut folders) = (Vec::new(), vec![folder.to_path_buf()]);
+    while let Some(folder) = folders.pop() {
+        let Ok(entries) = std::fs::read_dir(&folder) else {
+            found.push(folder);
+            continue;
+        };
+        for entry in entries.flatten().filter(|entry| !entry.file_name().as_encoded_bytes().starts_with(b".")) {
+            let path = entry.path();
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                folders.push(path);
+            } else if is_model(&path) && !path.is_dir() {
+                found.push(path);
+            }
+        }
+    }
+    found.sort_by(|a, b| a.as_os_str().as_encoded_bytes().cmp(b.as_os_str().as_encoded_bytes()));
+    if found.is_empty() { vec![folder.to_path_buf()] } else { found }
+}
+
+/// Why a folder is no scene: that it cannot be read, or that it has no models.
+pub fn fault_of_folder(folder: &Path) -> Failure {
+    let name = shown(folder);
+    Failure::Work(match std::fs::read_dir(folder) {
+        Err(e) => format!("{name}: {e}"),
+        Ok(_) => format!(
+            "{name}: no file in this folder or below ends in {}; hidden files and folders are left out, and links to \
+             folders are not followed",
+            model_endings()
+        ),
+    })
 }
 
 /// Whether these are the first bytes of a mesh file; of a binary STL file, all of its bytes.
@@ -237,6 +289,8 @@ fn read_model(path: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
         assets: Remembered { model: Some((called, file)), ..assets },
         strict: reading.strict,
         texture_memory: reading.texture_memory,
+        memory: None,
+        cache: None,
     })
 }
 
@@ -258,6 +312,8 @@ fn piped_model(name: &str, own: Option<PathBuf>, bytes: Vec<u8>, reading: &Readi
         assets,
         strict: reading.strict,
         texture_memory: reading.texture_memory,
+        memory: None,
+        cache: None,
     }
 }
 
@@ -293,10 +349,19 @@ pub fn names_of(scene: &Path) -> Names {
     let builtin_or_stdin = file_of(scene).is_none();
     let whole = |part: Option<&OsStr>| part.map_or_else(|| OsString::from("scene"), OsStr::to_owned);
     if scene == "-" {
-        return Names { stem: whole(None), name: whole(None) };
+        return Names { stem: whole(None), name: whole(None), parent: whole(None) };
     }
     let name = whole(scene.file_name());
-    Names { stem: if builtin_or_stdin { name.clone() } else { whole(scene.file_stem()) }, name }
+    if builtin_or_stdin {
+        return Names { stem: name.clone(), name, parent: whole(None) };
+    }
+    // As it was written, and of the working folder what it is called
+    let folder = scene.parent().unwrap_or(Path::new(""));
+    let parent = folder.file_name().map(OsStr::to_owned).or_else(|| {
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        folder.canonicalize().ok().and_then(|folder| folder.file_name().map(OsStr::to_owned))
+    });
+    Names { stem: whole(scene.file_stem()), name, parent: whole(parent.as_deref()) }
 }
 
 /// No course file that anybody writes is longer, in bytes.
@@ -374,6 +439,12 @@ impl Input {
         self.parsed.desc.without_models(&self.assets, time).map_err(|e| Failure::Scene(e.faults))
     }
 
+    /// Keeps what is dear to make of them as well: for other cameras and sizes nothing of it is made again.
+    pub fn remember_all(&mut self) {
+        self.remember_files();
+        self.cache = Some(CompileCache::default());
+    }
+
     /// Compiles the description as it is now, at `time` in seconds. Files are read the first time only: a scene has the
     /// same textures in all its frames. What takes its time is told, unless `quiet`.
     ///
@@ -387,7 +458,8 @@ impl Input {
             framing: self.framing,
             studio: self.studio.clone(),
             progress,
-            cache: None,
+            cache: self.cache.clone(),
+            memory: self.memory,
             texture_memory: self.texture_memory.map(|mib| u64::from(mib) << 20),
         };
         self.parsed.compile(&self.assets, &options).map_err(|e| Failure::Scene(e.faults))

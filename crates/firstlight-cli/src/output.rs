@@ -26,6 +26,47 @@ pub struct Names {
     pub stem: OsString,
     /// The whole of it: `{name}`.
     pub name: OsString,
+    /// The name of the folder that holds it: `{parent}`.
+    pub parent: OsString,
+}
+
+impl Names {
+    /// What a placeholder stands for.
+    fn of(&self, word: Word) -> &OsStr {
+        match word {
+            Word::Stem => &self.stem,
+            Word::Name => &self.name,
+            Word::Parent => &self.parent,
+        }
+    }
+}
+
+/// A placeholder of the scene's names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Word {
+    Stem,
+    Name,
+    Parent,
+}
+
+/// One of the pictures of a scene: what tells its files from those of the others.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Part {
+    /// The number of the frame.
+    pub frame: Option<u32>,
+    /// From where it is seen: `{view}`.
+    pub view: Option<ViewName>,
+    /// How large it is: `{size}`.
+    pub size: Option<String>,
+}
+
+/// What a view is called in the names of files.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ViewName {
+    /// By its word.
+    Word(String),
+    /// By its number on a turntable.
+    Turn(u32),
 }
 
 /// A picture to be written.
@@ -55,11 +96,23 @@ impl JsonFile {
     /// # Errors
     /// It is none.
     pub fn of(option: &'static str, path: &Path) -> Result<Self, Failure> {
+        Self::ending_in("json", option, path)
+    }
+
+    /// The same of a file of lines of JSON, which is a `.jsonl`.
+    ///
+    /// # Errors
+    /// It is none.
+    pub fn of_lines(option: &'static str, path: &Path) -> Result<Self, Failure> {
+        Self::ending_in("jsonl", option, path)
+    }
+
+    fn ending_in(ending: &str, option: &'static str, path: &Path) -> Result<Self, Failure> {
         let target = Target::of(path);
-        let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-        if target != Target::Stdout && !is_json {
+        let is_own = path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
+        if target != Target::Stdout && !is_own {
             let name = shown(path);
-            let message = format!("{option}{name}: the file's name must end in .json; - is standard output");
+            let message = format!("{option}{name}: the file's name must end in .{ending}; - is standard output");
             return Err(Failure::Usage(message));
         }
         Ok(JsonFile { option, target })
@@ -73,6 +126,17 @@ impl JsonFile {
     /// The option alone.
     pub fn option(&self) -> &'static str {
         self.option.trim_end_matches([' ', '='])
+    }
+
+    /// Sees that it has no placeholders.
+    ///
+    /// # Errors
+    /// It has one, and is one file of all scenes.
+    pub fn refuse_placeholders(&self) -> Result<(), Failure> {
+        let mut words = WORDS.iter().map(|(word, _)| *word).chain([VIEW, SIZE]);
+        let Some(word) = words.find(|word| self.target.has(word)) else { return Ok(()) };
+        let name = self.name();
+        Err(Failure::Usage(format!("{name}: {word} stands for nothing: it is one file of all scenes")))
     }
 
     /// With the names of a scene in place of the placeholders.
@@ -147,7 +211,30 @@ impl Target {
 
     /// Whether the whole name of the scene's file is in it.
     pub fn has_name(&self) -> bool {
-        matches!(self, Target::File(path) if path.to_str().is_some_and(|text| text.contains(NAME)))
+        self.has(NAME)
+    }
+
+    /// Whether the name of the scene's folder is in it.
+    pub fn has_parent(&self) -> bool {
+        self.has(PARENT)
+    }
+
+    fn has(&self, word: &str) -> bool {
+        matches!(self, Target::File(path) if path.to_str().is_some_and(|text| text.contains(word)))
+    }
+
+    /// The folder that is to be made for it, if this has placeholders in the names of folders, and `filled` is this with
+    /// the names of a scene in place of them. What stands before the first of them has to be there.
+    pub fn folder_to_make(&self, filled: &Target) -> Option<PathBuf> {
+        let (Target::File(path), Target::File(filled)) = (self, filled) else { return None };
+        let folder = path.parent()?;
+        let is_named = |text: &str| placeholder(text).is_some() || [VIEW, SIZE].iter().any(|word| text.contains(word));
+        let fixed: PathBuf =
+            folder.components().take_while(|part| !part.as_os_str().to_str().is_some_and(is_named)).collect();
+        let is_there = || if fixed.as_os_str().is_empty() { true } else { fixed.is_dir() };
+        (fixed.components().count() < folder.components().count() && is_there())
+            .then(|| filled.parent().map(Path::to_path_buf))
+            .flatten()
     }
 
     /// What messages call it.
@@ -155,6 +242,14 @@ impl Target {
         match self {
             Target::Stdout => "-".into(),
             Target::File(path) => shown(path),
+        }
+    }
+
+    /// The whole of its name, as other programs are told it.
+    pub fn whole(&self) -> String {
+        match self {
+            Target::Stdout => "-".into(),
+            Target::File(path) => path.to_string_lossy().into_owned(),
         }
     }
 
@@ -255,39 +350,66 @@ fn failed(e: ImageError) -> Failure {
     Failure::Work(e.to_string())
 }
 
-/// The first placeholder of a text: where it stands, and whether it is `{stem}`.
-fn placeholder(text: &str) -> Option<(std::ops::Range<usize>, bool)> {
-    let found = |word: &str| text.find(word).map(|at| (at..at + word.len(), word == STEM));
-    [found(STEM), found(NAME)].into_iter().flatten().min_by_key(|(range, _)| range.start)
+/// The first placeholder of a text that the scene's names fill: where it stands, and which it is.
+fn placeholder(text: &str) -> Option<(std::ops::Range<usize>, Word)> {
+    let found = |(word, which): &(&str, Word)| text.find(word).map(|at| (at..at + word.len(), *which));
+    WORDS.iter().filter_map(found).min_by_key(|(range, _)| range.start)
 }
 
 const STEM: &str = "{stem}";
 const NAME: &str = "{name}";
+const PARENT: &str = "{parent}";
+const WORDS: [(&str, Word); 3] = [(STEM, Word::Stem), (NAME, Word::Name), (PARENT, Word::Parent)];
+const VIEW: &str = "{view}";
+const SIZE: &str = "{size}";
 
 /// The path with the names of a scene in place of the placeholders. A path that is no text has none.
 fn filled(path: &Path, names: &Names) -> PathBuf {
     let Some(mut rest) = path.to_str() else { return path.to_path_buf() };
     let mut filled = OsString::new();
-    while let Some((range, is_stem)) = placeholder(rest) {
+    while let Some((range, word)) = placeholder(rest) {
         filled.push(&rest[..range.start]);
-        filled.push(if is_stem { &names.stem } else { &names.name });
+        filled.push(names.of(word));
         rest = &rest[range.end..];
     }
     filled.push(rest);
     filled.into()
 }
 
-/// Sees that words in braces are placeholders, and that each of several scenes has its own output.
+/// Which pictures of a scene there are several of, so that the names of outputs have to tell them apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Several {
+    /// `--views` or `--turntable`.
+    pub views: bool,
+    /// `--size` with several.
+    pub sizes: bool,
+}
+
+/// Sees that words in braces are placeholders, and that each of several scenes has its own output. `parts`: the
+/// pictures of a scene, each with a file of its own; `None` for what is one file of them all.
 ///
 /// # Errors
 /// What to write instead.
-pub fn check_placeholders(option: &str, target: &Target, several: bool) -> Result<(), Failure> {
+pub fn check_placeholders(option: &str, target: &Target, several: bool, parts: Option<Several>) -> Result<(), Failure> {
     let name = target.name();
     let words = name.split('{').skip(1).filter_map(|part| part.split_once('}')).map(|(word, _)| word);
     let is_word = |word: &&str| !word.is_empty() && word.bytes().all(|b| b.is_ascii_lowercase());
-    if let Some(word) = words.filter(is_word).find(|word| !["stem", "name"].contains(word)) {
-        let message =
-            format!("{option} {name}: {{{word}}} stands for nothing; {STEM} and {NAME} are those of the scene's file");
+    for word in words.filter(is_word) {
+        let message = match (word, parts) {
+            ("stem" | "name" | "parent", _) => continue,
+            ("view", Some(Several { views: true, .. })) | ("size", Some(Several { sizes: true, .. })) => continue,
+            ("view", Some(_)) => {
+                format!("{option} {name}: {VIEW} is one of --views or of --turntable, and neither is given")
+            }
+            ("size", Some(_)) => format!("{option} {name}: {SIZE} is one of several sizes, as --size 128,512"),
+            ("view" | "size", None) => {
+                format!("{option} {name}: {{{word}}} is for pictures; this is one file of them all")
+            }
+            _ => format!(
+                "{option} {name}: {{{word}}} stands for nothing; {STEM} and {NAME} are those of the scene's file, \
+                 {PARENT} that of its folder"
+            ),
+        };
         return Err(Failure::Usage(message));
     }
     if several && *target == Target::Stdout {
@@ -301,7 +423,7 @@ pub fn check_placeholders(option: &str, target: &Target, several: bool) -> Resul
         let own = shown(&own.with_file_name(format!("{STEM}{ending}")));
         let message = format!(
             "{option} {name} would be one file for several scenes; write '{own}', where {STEM} is the name of each \
-             scene without its ending ({NAME}: with it)"
+             scene without its ending ({NAME}: with it; {PARENT}: that of its folder)"
         );
         return Err(Failure::Usage(message));
     }
@@ -314,11 +436,11 @@ impl Output {
         Output { target: self.target.of_scene(names), ..self.clone() }
     }
 
-    /// Where the frame of that number goes.
-    pub fn of_frame(&self, frame: u32) -> Output {
+    /// Where one of the pictures of a scene goes.
+    pub fn of_part(&self, part: &Part) -> Output {
         let target = match &self.target {
             Target::Stdout => Target::Stdout,
-            Target::File(path) => Target::File(with_frame(path, frame)),
+            Target::File(path) => Target::File(with_part(path, part)),
         };
         Output { target, ..self.clone() }
     }
@@ -337,22 +459,53 @@ impl Output {
     }
 }
 
-/// The path with the number of a frame in its name: in place of the last row of `#`, with at least as many digits, else
-/// before the ending with at least four.
-fn with_frame(path: &Path, frame: u32) -> PathBuf {
-    let name = path.file_name().unwrap_or_default();
-    if let Some((before, marks, after)) = around_marks(name) {
-        let mut numbered = before;
-        numbered.push(format!("{frame:0marks$}"));
-        numbered.push(after);
-        return path.with_file_name(numbered);
+/// The path with what tells a picture of a scene from the others: in place of the placeholders, else before the ending,
+/// numbers last.
+fn with_part(path: &Path, part: &Part) -> PathBuf {
+    let mut path = path.to_path_buf();
+    match &part.view {
+        Some(ViewName::Word(word)) => path = with_word(&path, VIEW, word),
+        Some(ViewName::Turn(number)) => {
+            path = in_place(&path, VIEW, &format!("{number:04}")).unwrap_or_else(|| with_number(&path, *number));
+        }
+        None => {}
     }
-    let mut numbered = path.file_stem().unwrap_or_default().to_os_string();
-    numbered.push(format!(".{frame:04}"));
+    if let Some(size) = &part.size {
+        path = with_word(&path, SIZE, size);
+    }
+    part.frame.map_or_else(|| path.clone(), |frame| with_number(&path, frame))
+}
+
+/// The path with `word` in place of a placeholder, else before its ending.
+fn with_word(path: &Path, placeholder: &str, word: &str) -> PathBuf {
+    in_place(path, placeholder, word).unwrap_or_else(|| before_ending(path, word))
+}
+
+/// The path with `word` in place of a placeholder, if it has it.
+fn in_place(path: &Path, placeholder: &str, word: &str) -> Option<PathBuf> {
+    let text = path.to_str().filter(|text| text.contains(placeholder))?;
+    Some(text.replace(placeholder, word).into())
+}
+
+/// `a.word.png` of `a.png`.
+fn before_ending(path: &Path, word: &str) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_os_string();
+    name.push(format!(".{word}"));
     if let Some(ending) = path.extension() {
-        numbered.push(".");
-        numbered.push(ending);
+        name.push(".");
+        name.push(ending);
     }
+    path.with_file_name(name)
+}
+
+/// The path with the number of a frame or of a view in its name: in place of the last row of `#`, with at least as many
+/// digits, else before the ending with at least four.
+fn with_number(path: &Path, number: u32) -> PathBuf {
+    let name = path.file_name().unwrap_or_default();
+    let Some((before, marks, after)) = around_marks(name) else { return before_ending(path, &format!("{number:04}")) };
+    let mut numbered = before;
+    numbered.push(format!("{number:0marks$}"));
+    numbered.push(after);
     path.with_file_name(numbered)
 }
 
@@ -617,23 +770,41 @@ mod tests {
 
     #[test]
     fn placeholders_are_the_names_of_the_scene() {
-        let names = Names { stem: "a{name}".into(), name: "a.ply".into() };
+        let names = Names { stem: "a{name}".into(), name: "a.ply".into(), parent: "b{stem}".into() };
         for (path, expected) in [
             ("{stem}.png", "a{name}.png"),
+            ("{parent}-{name}.png", "b{stem}-a.ply.png"),
             ("{name}/{stem}{stem}.png", "a.ply/a{name}a{name}.png"),
             ("{}{Stem}{stem.png", "{}{Stem}{stem.png"),
         ] {
             assert_eq!(filled(Path::new(path), &names), Path::new(expected), "{path}");
         }
-        let check = |path: &str, several| check_placeholders("-o", &Target::of(Path::new(path)), several);
-        assert!(
-            check("{stem}.png", true).is_ok()
-                && check("a/{name}/x.png", true).is_ok()
-                && check("{A}{}.png", false).is_ok()
-        );
-        for (path, several) in [("a.png", true), ("-", true), ("{frame}.png", false), ("{stem}_{x}.png", true)] {
-            assert!(check(path, several).is_err(), "{path}");
+        let some = Several { views: true, sizes: false };
+        let check =
+            |path: &str, several, parts| check_placeholders("-o", &Target::of(Path::new(path)), several, parts).is_ok();
+        for (path, several) in
+            [("{stem}.png", true), ("a/{name}/x.png", true), ("{parent}.png", true), ("{A}{}.png", false)]
+        {
+            assert!(check(path, several, None) && check(path, several, Some(some)), "{path}");
         }
+        for (path, several) in [("a.png", true), ("-", true), ("{frame}.png", false), ("{stem}_{x}.png", true)] {
+            assert!(!check(path, several, None), "{path}");
+        }
+        assert!(check("{view}.png", false, Some(some)) && !check("{view}.png", false, None));
+        assert!(!check("{size}.png", false, Some(some)) && !check("{view}.png", true, Some(some)));
+    }
+
+    #[test]
+    fn a_folder_is_made_where_a_placeholder_names_it() {
+        let root = tempfile::tempdir().unwrap();
+        let target = |text: &str| Target::File(root.path().join(text));
+        let made = |template: &str, filled: &str| target(template).folder_to_make(&target(filled));
+        assert_eq!(made("{parent}/{stem}.png", "b/a.png"), Some(root.path().join("b")));
+        assert_eq!(made("{view}/x/a.png", "front/x/a.png"), Some(root.path().join("front/x")));
+        // What it would lie in is not there, or has no placeholder
+        assert_eq!(made("out/{parent}/{stem}.png", "out/b/a.png"), None);
+        assert_eq!(made("out/{stem}.png", "out/a.png"), None);
+        assert_eq!(made("{stem}.png", "a.png"), None);
     }
 
     #[test]
@@ -672,7 +843,25 @@ mod tests {
             ("x#/a.png", 0, "x#/a.0000.png"),
             ("a.##", 3, "a.03"),
         ] {
-            assert_eq!(with_frame(Path::new(path), frame), Path::new(expected), "{path}");
+            assert_eq!(with_number(Path::new(path), frame), Path::new(expected), "{path}");
+        }
+    }
+
+    #[test]
+    fn views_and_sizes_are_in_the_names_of_files() {
+        let word = |word: &str| Some(ViewName::Word(word.into()));
+        let size = |size: &str| Some(size.to_owned());
+        for (path, part, expected) in [
+            ("a.png", Part { view: word("top"), ..Part::default() }, "a.top.png"),
+            ("{view}/a.png", Part { view: word("top"), ..Part::default() }, "top/a.png"),
+            ("a.png", Part { view: Some(ViewName::Turn(3)), ..Part::default() }, "a.0003.png"),
+            ("a_##.png", Part { view: Some(ViewName::Turn(3)), ..Part::default() }, "a_03.png"),
+            ("a{view}_#.png", Part { view: Some(ViewName::Turn(3)), ..Part::default() }, "a0003_#.png"),
+            ("a.png", Part { frame: Some(7), view: word("top"), size: size("64") }, "a.top.64.0007.png"),
+            ("{size}-{view}-#.png", Part { frame: Some(7), view: word("top"), size: size("8x9") }, "8x9-top-7.png"),
+            ("a.png", Part::default(), "a.png"),
+        ] {
+            assert_eq!(with_part(Path::new(path), &part), Path::new(expected), "{path} {part:?}");
         }
     }
 
@@ -681,7 +870,7 @@ mod tests {
     fn a_name_need_not_be_utf8() {
         use std::os::unix::ffi::OsStrExt;
         let path = |bytes: &'static [u8]| Path::new(OsStr::from_bytes(bytes));
-        assert_eq!(with_frame(path(b"\xff_##\xfe.png"), 7), path(b"\xff_07\xfe.png"));
-        assert_eq!(with_frame(path(b"\xff.png"), 7), path(b"\xff.0007.png"));
+        assert_eq!(with_number(path(b"\xff_##\xfe.png"), 7), path(b"\xff_07\xfe.png"));
+        assert_eq!(with_number(path(b"\xff.png"), 7), path(b"\xff.0007.png"));
     }
 }

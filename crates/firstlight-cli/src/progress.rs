@@ -50,10 +50,10 @@ const LONG: Duration = Duration::from_secs(60);
 /// Tells standard error how far a render is.
 pub struct Progress {
     started: Instant,
-    /// Pixels of one frame.
-    frame: u64,
-    frames: u64,
-    /// Pixels of the frames before this one.
+    /// Pixels of all pictures.
+    all: u64,
+    pictures: u64,
+    /// Pixels of the pictures before this one.
     before: AtomicU64,
     /// Pixels; calls from several threads may come out of order, and a bar that goes back frightens.
     most: AtomicU64,
@@ -71,15 +71,15 @@ enum Kind {
 }
 
 impl Progress {
-    /// Begins now, for `frames` pictures of `frame` pixels each. `faster` is what would make it faster; it is said
+    /// Begins now, for so many pictures of `all` pixels together. `faster` is what would make it faster; it is said
     /// once, if it takes long.
-    pub fn begin(frame: u64, frames: u64, quiet: bool, faster: String) -> Self {
+    pub fn begin(all: u64, pictures: u64, quiet: bool, faster: String) -> Self {
         let started = Instant::now();
         let left = Arc::new(Mutex::new(TimeLeft::default()));
         let kind = if quiet {
             Kind::Silent
         } else if io::stderr().is_terminal() {
-            let bar = ProgressBar::with_draw_target(Some(frame * frames), ProgressDrawTarget::stderr());
+            let bar = ProgressBar::with_draw_target(Some(all), ProgressDrawTarget::stderr());
             let style = ProgressStyle::with_template("rendering {msg}{wide_bar} {percent:>3} %  {left}");
             let own = left.clone();
             let left = move |state: &ProgressState, text: &mut dyn fmt::Write| {
@@ -97,20 +97,20 @@ impl Progress {
             Kind::Lines(Mutex::new(started))
         };
         let (before, most) = (AtomicU64::new(0), AtomicU64::new(0));
-        Self { started, frame, frames, before, most, faster: Mutex::new(Some(faster)), left, kind }
+        Self { started, all, pictures, before, most, faster: Mutex::new(Some(faster)), left, kind }
     }
 
-    /// Frame `index` of all, counted from 0, is next.
-    pub fn frame(&self, index: u64) {
-        self.before.store(index * self.frame, Ordering::Relaxed);
-        if let (Kind::Bar(bar), 2..) = (&self.kind, self.frames) {
-            bar.set_message(format!("{} of {} ", index + 1, self.frames));
+    /// Picture `index` of all, counted from 0, is next; those before it have so many pixels.
+    pub fn picture(&self, index: u64, before: u64) {
+        self.before.store(before, Ordering::Relaxed);
+        if let (Kind::Bar(bar), 2..) = (&self.kind, self.pictures) {
+            bar.set_message(format!("{} of {} ", index + 1, self.pictures));
         }
     }
 
-    /// `done` pixels of this frame are there. For any thread, often.
+    /// `done` pixels of this picture are there. For any thread, often.
     pub fn update(&self, done: u64) {
-        let all = self.frame * self.frames;
+        let all = self.all;
         let done = self.before.load(Ordering::Relaxed) + done;
         let done = self.most.fetch_max(done, Ordering::Relaxed).max(done);
         match &self.kind {
@@ -156,16 +156,15 @@ impl Progress {
         }
     }
 
-    /// All pictures of that many columns and rows are there.
-    pub fn finish(&self, width: u32, height: u32) {
+    /// All pictures are there: `what`, as `3 frames of 8 x 6 pixels`.
+    pub fn finish(&self, what: &str) {
         let took = self.started.elapsed();
         match &self.kind {
             Kind::Silent => {}
             Kind::Bar(bar) => bar.finish_and_clear(),
             Kind::Lines(_) if took < WORTH_A_LINE => {}
             Kind::Lines(_) => {
-                let frames = if self.frames > 1 { format!("{} frames of ", self.frames) } else { String::new() };
-                say(format_args!("rendered {frames}{width} x {height} pixels in {}", words(took)));
+                say(format_args!("rendered {what} in {}", words(took)));
             }
         }
     }

@@ -2,23 +2,28 @@
 
 mod contents;
 mod dark;
+mod empty;
 mod moments;
 mod overrides;
+mod pictures;
 mod plan;
 mod print;
+mod summary;
 
 use std::time::{Duration, Instant};
 
-use firstlight::{Coco, Window};
+use firstlight::{Coco, Framing};
 
 use crate::args::{ReadingArgs, RenderArgs, Shard};
-use crate::input;
+use crate::input::{self, Input};
 use crate::interrupt::Watch;
 use crate::output::{Ready, Target};
 use crate::report::{Failure, say, shown, whole};
 use crate::stats::Stats;
-use moments::{Run, Took};
+use moments::{Moment, Run, Took};
+use pictures::Views;
 use plan::{Job, Plan, StatsPlan};
+use summary::Summary;
 
 /// Renders.
 ///
@@ -30,6 +35,7 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         return print::run(&plan, target.as_deref(), &args.reading);
     }
     plan.keep_shard();
+    let mut summary = Summary::begin(plan.summary.as_ref())?;
     match &plan.jobs[..] {
         [] => {
             if let (Some(Shard { index, count }), false) = (plan.shard, plan.quiet) {
@@ -37,24 +43,23 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
             }
             Ok(())
         }
-        [job] => render(&plan, job, &args.reading),
-        jobs => render_all(&plan, jobs, &args.reading),
-    }
+        [job] => render(&plan, job, &args.reading, &mut summary),
+        jobs => render_all(&plan, jobs, &args.reading, &mut summary),
+    }?;
+    summary.finish()
 }
 
 /// Renders one scene after the other, also after one that failed.
-fn render_all(plan: &Plan, jobs: &[Job], reading: &ReadingArgs) -> Result<(), Failure> {
+fn render_all(plan: &Plan, jobs: &[Job], reading: &ReadingArgs, summary: &mut Summary) -> Result<(), Failure> {
     let (all, mut failed) = (jobs.len(), Vec::new());
     for (index, job) in jobs.iter().enumerate() {
-        let scene = shown(job.scene);
+        let scene = shown(&job.scene);
         if !plan.quiet {
             say(format_args!("[{} of {all}] {scene}", index + 1));
         }
-        match render(plan, job, reading) {
+        match render(plan, job, reading, summary) {
             Ok(()) => {}
-            Err(
-                failure @ (Failure::Interrupted | Failure::InterruptedWriting(_) | Failure::InterruptedAfter { .. }),
-            ) => {
+            Err(failure) if failure.is_interruption() => {
                 if !matches!(failure, Failure::Interrupted) {
                     failure.show("render");
                 }
@@ -62,7 +67,7 @@ fn render_all(plan: &Plan, jobs: &[Job], reading: &ReadingArgs) -> Result<(), Fa
             }
             Err(failure) => {
                 failure.show("render");
-                failed.push(whole(job.scene));
+                failed.push(whole(&job.scene));
             }
         }
     }
@@ -75,15 +80,35 @@ fn render_all(plan: &Plan, jobs: &[Job], reading: &ReadingArgs) -> Result<(), Fa
     Ok(())
 }
 
-/// Renders one scene.
-fn render(plan: &Plan, job: &Job, reading: &ReadingArgs) -> Result<(), Failure> {
+/// Renders one scene, and keeps in the summary how its last picture ended if it failed.
+fn render(plan: &Plan, job: &Job, reading: &ReadingArgs, summary: &mut Summary) -> Result<(), Failure> {
+    summary.scene(job.scene.to_string_lossy().into_owned());
+    let done = render_pictures(plan, job, reading, summary);
+    match &done {
+        Err(failure) if !failure.is_interruption() => summary.end(Some(failure)),
+        _ => {}
+    }
+    done
+}
+
+/// Renders the pictures of one scene.
+fn render_pictures(plan: &Plan, job: &Job, reading: &ReadingArgs, summary: &mut Summary) -> Result<(), Failure> {
+    if input::file_of(&job.scene).is_some_and(|scene| scene.is_dir()) {
+        return Err(input::fault_of_folder(&job.scene));
+    }
+    let began = Instant::now();
     // Read the scene, and bring it together with the arguments
-    let (input, parse) = timed(|| input::read(job.scene, reading));
+    let (input, parse) = timed(|| input::read(&job.scene, reading));
     let mut input = input?;
-    let (outputs, settings) = plan.join(job, &mut input)?;
-    plan.check_buffers(&outputs, &input.parsed.desc.render.buffers)?;
-    let moments = plan.moments(job, &input, &outputs)?;
-    if moments.len() > 1 || input.parsed.desc.render.motion_to.is_some() {
+    input.memory = plan.max_memory;
+    let joined = plan.join(job, &mut input)?;
+    plan.check_buffers(&joined.outputs, &input.parsed.desc.render.buffers)?;
+    let mut moments = plan.moments(job, &input, &joined)?;
+    let settings = joined.settings;
+    let several = plan.pictures.several();
+    if several.views || several.sizes {
+        input.remember_all();
+    } else if moments.len() > 1 || input.parsed.desc.render.motion_to.is_some() {
         input.remember_files();
     }
 
@@ -97,28 +122,36 @@ fn render(plan: &Plan, job: &Job, reading: &ReadingArgs) -> Result<(), Failure> 
     let coco_file = coco.as_ref().map(Target::ready).transpose()?;
     watch.check()?;
     drop(watch);
+    if let Views::Turntable(count) = plan.pictures.views {
+        keep_distance(&mut input, &mut moments, count)?;
+    }
 
     // One moment after the other
-    let render = &input.parsed.desc.render;
-    let (x, y, width, height) = (0, 0, render.width, render.height);
-    let window = settings.crop.unwrap_or(Window { x, y, width, height });
+    let name = input.name.clone();
     let mut run = Run {
         plan,
-        input: &input,
+        input: &mut input,
+        summary,
         settings: &settings,
         beside: &beside,
         coco: coco.map(|target| (Coco::new(), target)),
         progress: None,
+        deadline: None,
         warned: Vec::new(),
     };
     let mut took: Option<Took> = None;
     for (index, moment) in moments.iter().enumerate() {
+        run.summary.picture(&name, &moment.outputs);
+        let begins = if index == 0 { began } else { Instant::now() };
+        run.deadline = plan.max_time.and_then(|time| begins.checked_add(time));
         let done = match ready.take() {
-            Some(ready) => run.render(index, &moments, window, ready),
-            None => moment.ready().and_then(|ready| run.render(index, &moments, window, ready)),
+            Some(ready) => run.render(index, &moments, ready),
+            None => moment.ready().and_then(|ready| run.render(index, &moments, ready)),
         };
         let done = done.map_err(|failure| match failure {
-            Failure::Interrupted if index > 0 => Failure::InterruptedAfter { done: index, all: moments.len() },
+            Failure::Interrupted if index > 0 => {
+                Failure::InterruptedAfter { done: index, all: moments.len(), what: plan.pictures.word() }
+            }
             failure => failure,
         })?;
         took = Some(match took {
@@ -133,13 +166,38 @@ fn render(plan: &Plan, job: &Job, reading: &ReadingArgs) -> Result<(), Failure> 
 
     // Say what it took
     let Some(Took { compile, render, write, rays }) = took else { return Ok(()) };
-    let (width, height, frames) = (window.width, window.height, moments.len());
-    let stats = Stats { scene: input.name, width, height, frames, parse, compile, render, write, rays };
+    let (size, pictures, what) = (plan.size_of(&moments), moments.len(), plan.in_words(&moments));
+    let stats = Stats { scene: name, size, pictures, what, parse, compile, render, write, rays };
     if let StatsPlan::Table = plan.stats {
         say(format_args!("{}", stats.to_table()));
     }
     if let Some(ready) = stats_file {
         write_json(plan, ready, &stats.to_json())?;
+    }
+    Ok(())
+}
+
+/// Has all views of a turntable look from one distance, the least at which each of them holds what is seen: as it is at
+/// 0 s, from where a camera is found.
+///
+/// # Errors
+/// Those of compiling.
+fn keep_distance(input: &mut Input, moments: &mut [Moment], count: u32) -> Result<(), Failure> {
+    let mut known: Vec<((u32, u32), Option<f64>)> = Vec::new();
+    for moment in moments {
+        let found = known.iter().find(|(size, _)| *size == moment.size).map(|(_, distance)| *distance);
+        let distance = match found {
+            Some(distance) => distance,
+            None => {
+                let render = &mut input.parsed.desc.render;
+                (render.width, render.height) = moment.size;
+                let first = input.framing;
+                let distance = input.compile(0.0, true)?.scene.turntable_distance(&first, count);
+                known.push((moment.size, distance));
+                distance
+            }
+        };
+        moment.framing = Framing { distance, ..moment.framing };
     }
     Ok(())
 }

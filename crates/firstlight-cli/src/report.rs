@@ -26,12 +26,14 @@ pub enum Failure {
     Interrupted,
     /// The same, while a device or pipe of this name let wait: exit code 130.
     InterruptedWriting(String),
-    /// The same, after some of the frames: exit code 130.
+    /// The same, after some of the pictures of a scene: exit code 130.
     InterruptedAfter {
-        /// Frames whose files are there.
+        /// Pictures whose files are there.
         done: usize,
-        /// Frames that were asked for.
+        /// Pictures that were asked for.
         all: usize,
+        /// `frames`, or what else they are.
+        what: &'static str,
     },
     /// Some of several scenes could not be rendered, and what was wrong with each has been said: exit code 1.
     Several {
@@ -67,6 +69,31 @@ impl Failure {
         })
     }
 
+    /// What went wrong, as one text for another program: every fault on a line of its own.
+    pub fn text(&self) -> String {
+        match self {
+            Failure::Usage(message) | Failure::Work(message) => message.clone(),
+            Failure::Scene(faults) => faults.iter().map(Diagnostic::to_string).collect::<Vec<_>>().join("\n"),
+            Failure::Differs => "differs".into(),
+            Failure::Several { failed, .. } => failed.join("\n"),
+            Failure::Interrupted
+            | Failure::InterruptedWriting(_)
+            | Failure::InterruptedAfter { .. }
+            | Failure::InterruptedIn { .. } => "interrupted".into(),
+        }
+    }
+
+    /// Whether somebody asked to stop.
+    pub fn is_interruption(&self) -> bool {
+        matches!(
+            self,
+            Failure::Interrupted
+                | Failure::InterruptedWriting(_)
+                | Failure::InterruptedAfter { .. }
+                | Failure::InterruptedIn { .. }
+        )
+    }
+
     /// Says what went wrong.
     pub fn show(&self, command: &str) {
         match self {
@@ -84,8 +111,8 @@ impl Failure {
             Failure::InterruptedWriting(to) => {
                 say(format_args!("interrupted while {to} was written; it may have got a part"));
             }
-            Failure::InterruptedAfter { done, all } => {
-                say(format_args!("interrupted; {done} of {all} frames were written, each of them whole"));
+            Failure::InterruptedAfter { done, all, what } => {
+                say(format_args!("interrupted; {done} of {all} {what} were written, each of them whole"));
             }
             Failure::Several { failed, all } => {
                 let count = failed.len();

@@ -9,12 +9,12 @@ use serde_json::json;
 pub struct Stats {
     /// What messages call the scene.
     pub scene: String,
-    /// Pixels across, of what was rendered.
-    pub width: u32,
-    /// Pixels down.
-    pub height: u32,
-    /// How many pictures of that size.
-    pub frames: usize,
+    /// Pixels across and down, of what was rendered; `None` for pictures of several sizes.
+    pub size: Option<[u32; 2]>,
+    /// How many pictures.
+    pub pictures: usize,
+    /// The same in words: `3 frames of 8 x 6 pixels`.
+    pub what: String,
     /// Reading the scene's text.
     pub parse: Duration,
     /// Checking it, reading its textures, building what rays need.
@@ -41,9 +41,9 @@ impl Stats {
         let value = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "scene": self.scene,
-            "width": self.width,
-            "height": self.height,
-            "frames": self.frames,
+            "width": self.size.map(|[width, _]| width),
+            "height": self.size.map(|[_, height]| height),
+            "frames": self.pictures,
             "parse_s": self.parse.as_secs_f64(),
             "compile_s": self.compile.as_secs_f64(),
             "render_s": self.render.as_secs_f64(),
@@ -111,15 +111,13 @@ impl Stats {
     /// One line for each stage and number, without a newline at the end.
     pub fn to_table(&self) -> String {
         let seconds = |time: Duration| format!("{:.3} s", time.as_secs_f64());
-        let frames = if self.frames > 1 { format!("{} frames of ", self.frames) } else { String::new() };
-        let picture = format!("{frames}{} x {} pixels", self.width, self.height);
         let how = format!("{}, {} thread{}", self.rays.simd.name(), self.rays.threads, plural(self.rays.threads));
         let all = self.rays.visibility.iter().sum::<u64>() + self.rays.closed_form;
         let each = self.rays.occluders as f64 / self.rays.shafts.max(1) as f64;
         let mut rows = vec![
             ("parse", seconds(self.parse), String::new()),
             ("compile", seconds(self.compile), String::new()),
-            ("render", seconds(self.render), format!("{picture}, {how}")),
+            ("render", seconds(self.render), format!("{}, {how}", self.what)),
             ("write", seconds(self.write), String::new()),
             ("camera rays", self.rays.camera_rays.to_string(), String::new()),
             (

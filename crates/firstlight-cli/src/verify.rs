@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use crate::args::{ModelArgs, ReadingArgs, VerifyArgs};
 use crate::difference::{self, Found};
-use crate::input::{self, Input};
+use crate::input::{self, Input, MODEL_ENDINGS};
 use crate::interrupt::Watch;
 use crate::progress::Progress;
 use crate::report::{Failure, answer, show_diagnostics, shown};
@@ -92,8 +92,8 @@ fn scenes_in(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let mut files = read().map_err(|e| Failure::Work(format!("--scene {}: {e}", shown(folder))))?;
     let is_scene = |path: &PathBuf| {
         let ending = path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
-        matches!(ending.as_deref(), Some("toml" | "json" | "txt" | "ply" | "stl" | "obj" | "glb" | "gltf"))
-            && path.is_file()
+        let is_one = |ending: &str| ["toml", "json", "txt"].contains(&ending) || MODEL_ENDINGS.contains(&ending);
+        ending.as_deref().is_some_and(is_one) && path.is_file()
     };
     files.retain(is_scene);
     files.sort();
@@ -140,7 +140,7 @@ fn render_again(
         watch.flow()
     });
     let ControlFlow::Continue((film, _)) = rendered else { return Err(Failure::Interrupted) };
-    progress.finish(width, height);
+    progress.finish(&format!("{width} x {height} pixels"));
     let files = FileSettings { display: said.display.unwrap_or_default(), ..FileSettings::of(&file.receipt) };
     let encoded = encode(&film, scene, &settings, file.format, &files);
     let again = encoded.and_then(|bytes| StoredPlanes::read(&bytes));

@@ -215,6 +215,10 @@ pub(crate) struct CompileContext {
     pub(crate) origin: DVec3,
     /// Whether anything has keys, so that the time decides the picture.
     pub(crate) keyed: bool,
+    /// Bytes that the scene may take, if that is said.
+    pub(crate) memory: Option<u64>,
+    /// Bytes that it takes with all that was asked for so far.
+    taken: u64,
     path: String,
     faults: Vec<Diagnostic>,
     /// What is said of scenes without errors.
@@ -225,6 +229,11 @@ pub(crate) struct CompileContext {
     omitted: usize,
 }
 
+/// What to do about a scene that takes so many bytes and may not.
+pub(crate) fn memory_hint(bytes: u64) -> String {
+    format!("make it smaller, or allow more: --max-memory {}", bytes.div_ceil(1 << 20))
+}
+
 /// Faults that are told; of more, the number.
 pub(crate) const MAX_FAULTS: usize = 256;
 
@@ -232,6 +241,31 @@ pub(crate) const MAX_FAULTS: usize = 256;
 const MAX_NAMES_COMPARED: usize = 1000;
 
 impl CompileContext {
+    /// Bytes that are left of those that the scene may take.
+    pub fn memory_left(&self) -> u64 {
+        self.memory.map_or(u64::MAX, |memory| memory.saturating_sub(self.taken))
+    }
+
+    /// Asks for so many bytes, before they are taken; `what` takes them. Where they are more than are left that is an
+    /// error of `field`, and the answer is no.
+    pub fn take(&mut self, field: &str, what: &str, bytes: u64) -> bool {
+        let before = self.taken;
+        self.taken = before.saturating_add(bytes);
+        let Some(memory) = self.memory.filter(|memory| self.taken > *memory) else { return true };
+        // Said once
+        if before > memory {
+            return false;
+        }
+        let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+        let (all, own) = (mib(self.taken), mib(bytes));
+        let message = format!(
+            "the scene takes about {all} MiB of memory, {own} of them for {what}, and may take {} MiB",
+            memory >> 20
+        );
+        self.error(field, message, Some(&memory_hint(self.taken)));
+        false
+    }
+
     /// For the moment `time`, in seconds.
     pub(crate) fn at_time(time: f64) -> Self {
         Self { time, ..Self::default() }

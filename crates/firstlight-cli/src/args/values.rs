@@ -142,6 +142,11 @@ pub(super) fn shard(text: &str) -> Result<Shard, String> {
     }
 }
 
+/// Reads how long a picture may take.
+pub(super) fn limit_of_time(text: &str) -> Result<f64, String> {
+    number(text, 1e-3..=1e9, "a number of seconds from 0.001 to 1e9 is needed")
+}
+
 /// Reads the largest difference that is allowed.
 pub(super) fn limit(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -179,6 +184,15 @@ pub enum Size {
     Both(u32, u32),
 }
 
+impl std::fmt::Display for Size {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Size::Longer(side) => write!(f, "{side}"),
+            Size::Both(width, height) => write!(f, "{width}x{height}"),
+        }
+    }
+}
+
 /// Reads `PIXELS`, or `WIDTHxHEIGHT`.
 pub(super) fn size(text: &str) -> Result<Size, String> {
     let side = |text: &str| whole::<u32>(1, 65536)(text).ok();
@@ -206,6 +220,24 @@ pub fn color(text: &str) -> Result<ColorDesc, String> {
             "{near}a colour is '#336699' or '#369' (hexadecimal digits, sRGB), a name of CSS such as orange, or three \
              numbers R,G,B from 0 to 1e6 (linear)"
         )
+    })
+}
+
+/// A view by its name.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NamedView {
+    /// As it was written.
+    pub name: &'static str,
+    /// What it means.
+    pub view: View,
+}
+
+/// Reads the name of a view.
+pub(super) fn named_view(text: &str) -> Result<NamedView, String> {
+    let named = View::NAMED.iter().find(|(name, _)| *name == text);
+    named.map(|(name, view)| NamedView { name, view: *view }).ok_or_else(|| {
+        let names: Vec<&str> = View::NAMED.iter().map(|(name, _)| *name).collect();
+        format!("names are needed, with commas between: {}; a view of two angles is a --view", names.join(", "))
     })
 }
 
@@ -337,6 +369,9 @@ mod tests {
     #[test]
     fn a_view_is_a_name_or_two_angles() {
         assert_eq!((view("left"), view("-30,15.5")), (Ok(View::new(-90.0, 0.0)), Ok(View::new(-30.0, 15.5))));
+        assert_eq!((view("side"), view("three-quarter")), (view("right"), Ok(View::default())));
+        assert_eq!(named_view("side"), Ok(NamedView { name: "side", view: View::new(90.0, 0.0) }));
+        assert!(named_view("30,15").is_err() && named_view("Left").is_err());
         for bad in ["", "Left", "above", "30", "1,2,3", "0,91", "361,0", "nan,0", "inf,0"] {
             assert!(view(bad).is_err(), "{bad}");
         }

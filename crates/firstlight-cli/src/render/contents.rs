@@ -3,6 +3,7 @@
 use firstlight::{Buffer, Display, FileSettings, Film, Format, Plane, PlaneNumbers, RenderSettings, Scene};
 
 use super::plan::Plan;
+use super::summary::Summary;
 use crate::output::{Content, Output};
 use crate::report::{Failure, say};
 
@@ -69,59 +70,51 @@ impl<'a> Contents<'a> {
         settings: &RenderSettings,
         film: &Film,
         scene: &Scene,
+        summary: &mut Summary,
     ) -> Result<Vec<Vec<u8>>, Failure> {
         let own = scene.display();
         let display = Display { exposure: plan.exposure.unwrap_or(own.exposure), ..own };
         let files =
             FileSettings { display, depth_scale: plan.depth_scale, half: plan.half, jpeg_quality: plan.quality };
-        let bytes = |(output, buffers): &(&Output, Vec<Buffer>)| {
+        let mut bytes = |(output, buffers): &(&Output, Vec<Buffer>)| {
             let heat = (output.content == Content::Heat).then(|| film.heat()).flatten();
             let encoded = match heat {
                 Some(heat) => {
                     heat.picture().encode(output.format, &Display::default(), &scene.buffers_receipt(settings, buffers))
                 }
                 None => {
-                    warn_of_far(output, buffers, film, &files, plan)?;
+                    if let Some(warning) = warning_of_far(output, buffers, film, &files) {
+                        if plan.strict {
+                            return Err(Failure::Work(warning));
+                        }
+                        say(format_args!("warning: {warning}"));
+                        summary.warn(warning);
+                    }
                     film.encode(buffers, output.format, &files, &scene.buffers_receipt(settings, buffers))
                 }
             };
             encoded.map_err(|e| Failure::Work(format!("{}: {e}", output.target.name())))
         };
-        self.0.iter().map(bytes).collect()
+        self.0.iter().map(&mut bytes).collect()
     }
 }
 
-/// Says how many pixels are farther away than a file can tell.
-///
-/// # Errors
-/// There are some, and warnings are errors.
-fn warn_of_far(
-    output: &Output,
-    buffers: &[Buffer],
-    film: &Film,
-    files: &FileSettings,
-    plan: &Plan,
-) -> Result<(), Failure> {
-    let [buffer] = buffers else { return Ok(()) };
+/// How many pixels are farther away than a file can tell, if there are any.
+fn warning_of_far(output: &Output, buffers: &[Buffer], film: &Film, files: &FileSettings) -> Option<String> {
+    let [buffer] = buffers else { return None };
     if !output.is_png() || !buffer.plane().is_distance() {
-        return Ok(());
+        return None;
     }
-    let Some(PlaneNumbers::Floats(distances)) = film.numbers(*buffer) else { return Ok(()) };
+    let Some(PlaneNumbers::Floats(distances)) = film.numbers(*buffer) else { return None };
     let far = files.beyond(distances);
-    if far == 0 {
-        return Ok(());
-    }
-    let words = format!(
-        "{}: {far} of {} pixels are farther than {} m, the most at {} units per metre, and are 0; a smaller \
+    (far > 0).then(|| {
+        format!(
+            "{}: {far} of {} pixels are farther than {} m, the most at {} units per metre, and are 0; a smaller \
          --depth-scale reaches farther, .exr, .npz and .npy files hold any distance",
-        output.target.name(),
-        distances.len(),
-        files.farthest(),
-        files.depth_scale
-    );
-    if plan.strict {
-        return Err(Failure::Work(words));
-    }
-    say(format_args!("warning: {words}"));
-    Ok(())
+            output.target.name(),
+            distances.len(),
+            files.farthest(),
+            files.depth_scale
+        )
+    })
 }

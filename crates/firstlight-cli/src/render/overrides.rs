@@ -15,6 +15,7 @@ const SIDE_LIMIT: u64 = 1 << 16;
 pub(super) struct Overrides<'a> {
     pub width: Option<u32>,
     pub height: Option<u32>,
+    /// Of the first of several sizes.
     pub size: Option<Size>,
     pub transparent: bool,
     pub background: Option<ColorDesc>,
@@ -33,13 +34,10 @@ impl Overrides<'_> {
     pub fn apply(&self, desc: &mut SceneDesc) -> Result<(), Failure> {
         let render = &mut desc.render;
         let scene = (render.width, render.height);
-        let asked = match self.size {
-            Some(Size::Both(width, height)) => (Some(width), Some(height)),
-            Some(Size::Longer(side)) if scene.0 >= scene.1 => (Some(side), None),
-            Some(Size::Longer(side)) => (None, Some(side)),
-            None => (self.width, self.height),
+        (render.width, render.height) = match self.size {
+            Some(size) => sized(size, scene)?,
+            None => film_size((self.width, self.height), scene)?,
         };
-        (render.width, render.height) = film_size(asked, scene)?;
         if let Some(background) = self.background {
             (render.background, render.transparent) = (background, false);
         }
@@ -121,6 +119,16 @@ fn no_such_camera(option: &str, name: &str, desc: &SceneDesc) -> String {
         [] => format!("{option} {name}: the scene names no cameras; leave the option out"),
         _ => format!("{option} {name}: the scene has no such camera; it has {}", names.join(", ")),
     }
+}
+
+/// Columns and rows of a size, of a scene of so many columns and rows.
+pub(super) fn sized(size: Size, scene: (u32, u32)) -> Result<(u32, u32), Failure> {
+    let asked = match size {
+        Size::Both(width, height) => (Some(width), Some(height)),
+        Size::Longer(side) if scene.0 >= scene.1 => (Some(side), None),
+        Size::Longer(side) => (None, Some(side)),
+    };
+    film_size(asked, scene)
 }
 
 /// Columns and rows: as asked, and one alone keeps the scene's aspect ratio, to the nearest pixel.

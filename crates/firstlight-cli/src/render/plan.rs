@@ -4,14 +4,16 @@ use std::collections::{HashMap, HashSet};
 use std::iter;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use firstlight::{
     AaMode, BufferDesc, FileSettings, Format, Framing, Plane, RenderSettings, ShadowTerminator, SimdLevel, View, Window,
 };
 
 use super::moments::Moment;
-use super::overrides::Overrides;
-use crate::args::{AntialiasingMode, Bits, Frames, RenderArgs, Shard, Terminator};
+use super::overrides::{Overrides, sized};
+use super::pictures::{Pictures, Views};
+use crate::args::{AntialiasingMode, Bits, NamedView, RenderArgs, Shard, Terminator};
 use crate::input::{self, Input};
 use crate::output::{self, Content, JsonFile, Names, Output, Target};
 use crate::report::{Failure, say, shown};
@@ -21,7 +23,7 @@ const PIXEL_LIMIT: u64 = 1 << 27;
 
 /// The arguments, understood as far as they can be without the scene.
 pub(super) struct Plan<'a> {
-    pub jobs: Vec<Job<'a>>,
+    pub jobs: Vec<Job>,
     /// Without the names of the scene in them. Empty: the one that the scene says.
     pub outputs: Vec<Output>,
     pub heat: Option<Output>,
@@ -29,6 +31,8 @@ pub(super) struct Plan<'a> {
     pub stats: StatsPlan,
     /// Where annotations go.
     pub coco: Option<JsonFile>,
+    /// Where the log of the run goes.
+    pub summary: Option<JsonFile>,
     pub settings: RenderSettings,
     pub overrides: Overrides<'a>,
     /// Of 8- and 16-bit files, in place of the scene's.
@@ -47,14 +51,19 @@ pub(super) struct Plan<'a> {
     pub time: f64,
     /// Whether a moment was said: models play their first animation then.
     pub plays: bool,
-    pub frames: Option<Frames>,
+    /// Those of each scene.
+    pub pictures: Pictures,
     pub shard: Option<Shard>,
+    /// How long a picture may take.
+    pub max_time: Option<Duration>,
+    /// Bytes that a scene and its picture may take.
+    pub max_memory: Option<u64>,
     pub quiet: bool,
 }
 
 /// One of the scenes to render.
-pub(super) struct Job<'a> {
-    pub scene: &'a Path,
+pub(super) struct Job {
+    pub scene: PathBuf,
     /// Which of the scenes that were given, from 0 on.
     pub index: usize,
     /// What the placeholders in the names of its outputs stand for.
@@ -105,22 +114,32 @@ impl<'a> Plan<'a> {
             return Err(Failure::Usage("--quality is for JPEG files, as -o a.jpg, and no output is one".into()));
         }
         let heat = args.heat.as_deref().map(heat_output).transpose()?;
-        let jobs: Vec<Job> = args
-            .scenes
-            .iter()
+        let summary = args.summary.as_deref().map(|path| JsonFile::of_lines("--summary ", path)).transpose()?;
+        let pictures = pictures_of(args)?;
+        let jobs: Vec<Job> = input::with_folders(&args.scenes)
+            .into_iter()
             .enumerate()
-            .map(|(index, scene)| Job { scene, index, names: input::names_of(scene) })
+            .map(|(index, scene)| Job { names: input::names_of(&scene), scene, index })
             .collect();
         let several = jobs.len() > 1;
-        let pictures = outputs.iter().map(|output| ("-o", &output.target));
-        let pictures = pictures.chain(heat.iter().map(|heat| ("--heat", &heat.target)));
-        for (option, target) in pictures.chain(beside.iter().map(|file| (file.option(), &file.target))) {
-            output::check_placeholders(option, target, several)?;
+        let parts = Some(pictures.several());
+        let of_pictures = outputs.iter().map(|output| ("-o", &output.target));
+        for (option, target) in of_pictures.chain(heat.iter().map(|heat| ("--heat", &heat.target))) {
+            output::check_placeholders(option, target, several, parts)?;
+        }
+        for file in &beside {
+            output::check_placeholders(file.option(), &file.target, several, None)?;
+        }
+        if let Some(file) = &summary {
+            file.refuse_placeholders()?;
         }
         for job in &jobs {
-            let all: Vec<Output> = outputs.iter().chain(&heat).map(|output| output.of_scene(&job.names)).collect();
-            let beside: Vec<JsonFile> = beside.iter().map(|file| file.of_scene(&job.names)).collect();
-            output::refuse_clashes(input::file_of(job.scene), &all, &beside)?;
+            let first = pictures.iter().next().map(|picture| picture.part).unwrap_or_default();
+            let of_job = |output: &Output| output.of_part(&first).of_scene(&job.names);
+            let all: Vec<Output> = outputs.iter().chain(&heat).map(of_job).collect();
+            let beside: Vec<JsonFile> =
+                beside.iter().map(|file| file.of_scene(&job.names)).chain(summary.clone()).collect();
+            output::refuse_clashes(input::file_of(&job.scene), &all, &beside)?;
         }
 
         let simd = args.simd.unwrap_or(SimdLevel::Auto);
@@ -130,19 +149,26 @@ impl<'a> Plan<'a> {
             return Err(Failure::Usage(format!("--simd {name} is not to be had on this processor; it has {names}")));
         }
 
-        if args.frames.is_some() && outputs.iter().any(|output| output.target == Target::Stdout) {
-            let message =
-                "--frames writes a file for each frame, and -o - is not one; name files, or give --time instead";
-            return Err(Failure::Usage(message.into()));
+        if let Some(option) = pictures.option()
+            && outputs.iter().any(|output| output.target == Target::Stdout)
+        {
+            let (each, instead) = match option {
+                "--frames" => ("frame", ", or give --time instead"),
+                "--size" => ("size", ", or one size"),
+                _ => ("view", ", or give --view instead"),
+            };
+            let message = format!("{option} writes a file for each {each}, and -o - is not one; name files{instead}");
+            return Err(Failure::Usage(message));
         }
 
         // A file beside the pictures is one of all frames; several scenes have one each
-        if let (Some(_), Some(_), [file, ..]) = (args.shard, args.frames, &beside[..]) {
+        if let (Some(_), true, [file, ..]) = (args.shard, pictures.count() > 1, &beside[..]) {
+            let what = pictures.word();
             let instead = match file.option() {
                 "--stats" => "--stats alone is a table of each",
-                _ => "it takes all frames in one run, without --shard",
+                _ => &format!("it takes all {what} in one run, without --shard"),
             };
-            let message = format!("{}: every shard of the frames would write this file; {instead}", file.name());
+            let message = format!("{}: every shard of the {what} would write this file; {instead}", file.name());
             return Err(Failure::Usage(message));
         }
 
@@ -163,7 +189,7 @@ impl<'a> Plan<'a> {
         let overrides = Overrides {
             width: args.width,
             height: args.height,
-            size: args.size,
+            size: args.size.first().copied(),
             transparent: args.transparent,
             background: args.background,
             antialiasing: args.aa,
@@ -178,7 +204,7 @@ impl<'a> Plan<'a> {
                 Terminator::Hard => ShadowTerminator::Hard,
             }),
         };
-        let (bits, frames, quiet) = (args.bits, args.frames, args.quiet);
+        let (bits, quiet) = (args.bits, args.quiet);
         let plan = Self {
             jobs,
             outputs,
@@ -186,6 +212,7 @@ impl<'a> Plan<'a> {
             bits,
             stats,
             coco,
+            summary,
             settings,
             overrides,
             exposure: args.exposure,
@@ -197,8 +224,10 @@ impl<'a> Plan<'a> {
             margin: args.margin,
             time: args.time.unwrap_or(0.0),
             plays: args.time.is_some() || args.frames.is_some(),
-            frames,
+            pictures,
             shard: args.shard,
+            max_time: args.max_time.map(Duration::from_secs_f64),
+            max_memory: args.max_memory.map(|mib| u64::from(mib) << 20),
             quiet,
         };
         if several {
@@ -207,39 +236,36 @@ impl<'a> Plan<'a> {
         Ok(plan)
     }
 
-    /// Whether a picture is one to render. They are counted from 0, over all frames of one scene after the other.
-    fn takes(&self, scene: usize, frame: u32) -> bool {
-        let frames = self.frames.map_or(1, |Frames { first, last }| u64::from(last - first) + 1);
-        self.shard.is_none_or(|shard| shard.has(scene as u64 * frames + u64::from(frame)))
+    /// Whether a picture is one to render. They are counted from 0, over all pictures of one scene after the other.
+    fn takes(&self, scene: usize, picture: u64) -> bool {
+        self.shard.is_none_or(|shard| shard.has(scene as u64 * self.pictures.count() + picture))
     }
 
     /// Leaves to the jobs those that have something to render.
     pub fn keep_shard(&mut self) {
-        let last = self.frames.map_or(0, |Frames { first, last }| last - first);
         let mut jobs = std::mem::take(&mut self.jobs);
-        jobs.retain(|job| (0..=last).any(|frame| self.takes(job.index, frame)));
+        jobs.retain(|job| (0..self.pictures.count()).any(|picture| self.takes(job.index, picture)));
         self.jobs = jobs;
     }
 
     /// Sees that no two of several scenes have an output in common, and that none is the file of another scene.
     fn refuse_shared(&self) -> Result<(), Failure> {
         let scenes: HashSet<Target> =
-            self.jobs.iter().filter_map(|job| input::file_of(job.scene)).map(|file| Target::of(file).real()).collect();
-        let frames = self.frames.map_or(0..=0, |Frames { first, last }| first..=last);
+            self.jobs.iter().filter_map(|job| input::file_of(&job.scene)).map(|file| Target::of(file).real()).collect();
         let mut seen: HashMap<Target, usize> = HashMap::new();
         for (index, job) in self.jobs.iter().enumerate() {
             let own = if self.outputs.is_empty() {
                 // What is wrong with it is said when it is its turn
-                self.default_output(job, &shown(job.scene), input::course_output(job.scene).as_deref(), false)
+                self.default_output(job, &shown(&job.scene), input::course_output(&job.scene).as_deref(), false)
                     .into_iter()
                     .collect()
             } else {
                 self.outputs.clone()
             };
-            let pictures = own.iter().chain(&self.heat).flat_map(|output| {
-                let of_frame = move |frame| if self.frames.is_some() { output.of_frame(frame) } else { output.clone() };
-                frames.clone().map(of_frame).map(|output| output.target)
-            });
+            let pictures = own
+                .iter()
+                .chain(&self.heat)
+                .flat_map(|output| self.pictures.iter().map(move |picture| output.of_part(&picture.part).target));
             let beside = self.stats.file().into_iter().chain(&self.coco).map(|file| file.target.clone());
             for written in pictures.chain(beside) {
                 let target = written.of_scene(&job.names);
@@ -252,14 +278,18 @@ impl<'a> Plan<'a> {
                 if let Some(before) = seen.insert(real, index)
                     && before != index
                 {
-                    let [one, other] = [self.jobs[before].scene, job.scene];
+                    let [one, other] = [&self.jobs[before], job].map(|job| job.scene.as_path());
                     let way = match (input::file_of(one), input::file_of(other)) {
                         _ if one == other => "name it once",
                         (Some(a), Some(b)) if Target::of(a).real() == Target::of(b).real() => {
                             "they are one file, name it once"
                         }
                         _ if self.jobs[before].names.name == job.names.name || written.has_name() => {
-                            "render them in two calls, to folders of their own"
+                            if self.jobs[before].names.parent != job.names.parent && !written.has_parent() {
+                                "{parent} in the output's name keeps their folders apart"
+                            } else {
+                                "render them in two calls, to folders of their own"
+                            }
                         }
                         _ => "{name} in the output's name keeps their endings apart",
                     };
@@ -271,44 +301,83 @@ impl<'a> Plan<'a> {
         Ok(())
     }
 
+    /// What messages call pictures: `3 frames of 8 x 6 pixels`.
+    pub fn in_words(&self, moments: &[Moment]) -> String {
+        let (word, count) = (self.pictures.word(), moments.len());
+        match (count, self.size_of(moments)) {
+            (1, Some([width, height])) => format!("{width} x {height} pixels"),
+            (_, Some([width, height])) => format!("{count} {word} of {width} x {height} pixels"),
+            (_, None) => format!("{count} {word}"),
+        }
+    }
+
+    /// Columns and rows of pictures, if they have the same.
+    pub fn size_of(&self, moments: &[Moment]) -> Option<[u32; 2]> {
+        let mut sizes = moments.iter().map(|moment| moment.rendered(self.settings.crop));
+        let first = sizes.next()?;
+        sizes.all(|size| size == first).then_some(first)
+    }
+
     /// The files beside the pictures of a scene.
     pub fn beside(&self, names: &Names) -> Vec<JsonFile> {
-        self.stats.file().into_iter().chain(&self.coco).map(|file| file.of_scene(names)).collect()
+        let of_scene = self.stats.file().into_iter().chain(&self.coco).map(|file| file.of_scene(names));
+        of_scene.chain(self.summary.clone()).collect()
     }
 
     /// The moments to render, each with its own files.
-    pub fn moments(&self, job: &Job, input: &Input, outputs: &[Output]) -> Result<Vec<Moment>, Failure> {
-        let Some(Frames { first, last }) = self.frames else {
-            let outputs = outputs.iter().map(|output| output.of_scene(&job.names)).collect();
-            return Ok(vec![Moment { time: self.time, outputs }]);
-        };
+    pub fn moments(&self, job: &Job, input: &Input, joined: &Joined) -> Result<Vec<Moment>, Failure> {
         let beside = self.beside(&job.names);
-        for output in outputs {
-            if let Target::File(path) = &output.target
-                && path.metadata().is_ok_and(|meta| !meta.is_file() && !meta.is_dir())
-            {
-                let path = shown(path);
-                return Err(Failure::Usage(format!("--frames writes a file for each frame, and {path} is not one")));
+        if let Some(option) = self.pictures.option() {
+            let each = match option {
+                "--frames" => "frame",
+                "--size" => "size",
+                _ => "view",
+            };
+            for output in &joined.outputs {
+                if let Target::File(path) = &output.target
+                    && path.metadata().is_ok_and(|meta| !meta.is_file() && !meta.is_dir())
+                {
+                    let path = shown(path);
+                    return Err(Failure::Usage(format!(
+                        "{option} writes a file for each {each}, and {path} is not one"
+                    )));
+                }
             }
         }
         // Compiling refuses a rate that is none
         let fps = Some(input.parsed.desc.render.fps).filter(|fps| *fps > 0.0).unwrap_or(1.0);
         let mut seen = HashSet::new();
         let mut moments = Vec::new();
-        for frame in first..=last {
-            let outputs = outputs.iter().map(|output| output.of_frame(frame).of_scene(&job.names));
-            let outputs: Vec<Output> = outputs.collect();
-            output::refuse_clashes(input::file_of(job.scene), &outputs, &beside)?;
-            for output in &outputs {
-                if let Target::File(path) = &output.target
-                    && !seen.insert(path.clone())
-                {
-                    let path = shown(path);
-                    return Err(Failure::Usage(format!("two frames would be {path}; give the files other names")));
+        for picture in self.pictures.iter() {
+            let of_part = joined.outputs.iter().map(|output| output.of_part(&picture.part));
+            let outputs: Vec<Output> = of_part.map(|output| output.of_scene(&job.names)).collect();
+            if self.pictures.option().is_some() {
+                output::refuse_clashes(input::file_of(&job.scene), &outputs, &beside)?;
+                for output in &outputs {
+                    if let Target::File(path) = &output.target
+                        && !seen.insert(path.clone())
+                    {
+                        let (what, path) = (self.pictures.word(), shown(path));
+                        return Err(Failure::Usage(format!("two {what} would be {path}; give the files other names")));
+                    }
                 }
             }
-            if self.takes(job.index, frame - first) {
-                moments.push(Moment { time: f64::from(frame) / fps, outputs });
+            if self.takes(job.index, picture.index) {
+                let to_make = joined.outputs.iter().zip(&outputs);
+                let folders =
+                    to_make.filter_map(|(template, output)| template.target.folder_to_make(&output.target)).collect();
+                let view = match &self.pictures.views {
+                    Views::One => None,
+                    Views::Named(views) => Some(views[picture.view].view),
+                    Views::Turntable(count) => Some(input.framing.view.turned(picture.view as u32, *count)),
+                };
+                moments.push(Moment {
+                    time: picture.part.frame.map_or(self.time, |frame| f64::from(frame) / fps),
+                    framing: view.map_or(input.framing, |view| Framing { view, ..input.framing }),
+                    size: joined.sizes[picture.size],
+                    outputs,
+                    folders,
+                });
             }
         }
         Ok(moments)
@@ -319,12 +388,13 @@ impl<'a> Plan<'a> {
     ///
     /// # Errors
     /// What the options ask for and the scene has not.
-    pub fn join(&self, job: &Job, input: &mut Input) -> Result<(Vec<Output>, RenderSettings), Failure> {
+    pub fn join(&self, job: &Job, input: &mut Input) -> Result<Joined, Failure> {
         // A text with faults may lack what the options refer to: say the faults, not what follows from them
         if input.parsed.faults().iter().any(|fault| fault.severity == firstlight::Severity::Error) {
             input.compile(self.time, self.quiet)?;
         }
         input.show(self.plays, self.overrides.camera.is_some());
+        let own = (input.parsed.desc.render.width, input.parsed.desc.render.height);
         self.overrides.apply(&mut input.parsed.desc)?;
         self.frame(input)?;
 
@@ -334,35 +404,24 @@ impl<'a> Plan<'a> {
             let threads = input.parsed.threads.map(|n| n.min(1024) as usize);
             settings.threads = threads.and_then(NonZeroUsize::new);
         }
-        let (width, height) = (input.parsed.desc.render.width, input.parsed.desc.render.height);
-        if let Some(crop) = settings.crop
-            && !inside(crop, width, height)
-        {
-            let Window { x, y, width: w, height: h } = crop;
-            return Err(Failure::Usage(format!(
-                "--crop {x},{y},{w},{h} is not inside the picture, which is {width} x {height} pixels"
-            )));
-        }
-
-        let (width, height) = settings.crop.map_or((width, height), |crop| (crop.width, crop.height));
-        let pixels = u64::from(width) * u64::from(height);
-        if pixels > PIXEL_LIMIT {
-            return Err(Failure::Usage(format!(
-                "{width} x {height} are {pixels} pixels, and at most {PIXEL_LIMIT} are rendered at once; render parts \
-                 of the picture, each with --crop X,Y,WIDTH,HEIGHT"
-            )));
+        let first = (input.parsed.desc.render.width, input.parsed.desc.render.height);
+        let others = self.pictures.sizes.iter().skip(1).map(|size| sized(*size, own));
+        let sizes: Vec<(u32, u32)> = iter::once(Ok(first)).chain(others).collect::<Result<_, _>>()?;
+        for (width, height) in sizes.iter().copied() {
+            check_size(settings.crop, width, height)?;
         }
 
         if !self.outputs.is_empty() {
-            return Ok((self.outputs.iter().chain(&self.heat).cloned().collect(), settings));
+            let outputs = self.outputs.iter().chain(&self.heat).cloned().collect();
+            return Ok(Joined { outputs, settings, sizes });
         }
         let outputs: Vec<Output> =
             iter::once(self.default_output(job, &input.name, input.parsed.output.as_deref(), true)?)
                 .chain(self.heat.clone())
                 .collect();
         let own: Vec<Output> = outputs.iter().map(|output| output.of_scene(&job.names)).collect();
-        output::refuse_clashes(input::file_of(job.scene), &own, &self.beside(&job.names))?;
-        Ok((outputs, settings))
+        output::refuse_clashes(input::file_of(&job.scene), &own, &self.beside(&job.names))?;
+        Ok(Joined { outputs, settings, sizes })
     }
 
     /// Says what comes of buffers that the scene asks for, where no output takes them.
@@ -380,7 +439,18 @@ impl<'a> Plan<'a> {
 
     /// Has a camera that is found for the scene frame it as asked.
     fn frame(&self, input: &mut Input) -> Result<(), Failure> {
-        for (option, said) in [("--view", self.view.is_some()), ("--margin", self.margin.is_some())] {
+        let (named, turned) = match self.pictures.views {
+            Views::One => (false, false),
+            Views::Named(_) => (true, false),
+            Views::Turntable(_) => (false, true),
+        };
+        let options = [
+            ("--view", self.view.is_some()),
+            ("--views", named),
+            ("--turntable", turned),
+            ("--margin", self.margin.is_some()),
+        ];
+        for (option, said) in options {
             if said && !input.parsed.desc.cameras.is_empty() {
                 let name = &input.name;
                 return Err(Failure::Usage(format!(
@@ -390,7 +460,8 @@ impl<'a> Plan<'a> {
             }
         }
         let found = input.framing;
-        input.framing = Framing { view: self.view.unwrap_or(found.view), margin: self.margin.unwrap_or(found.margin) };
+        let (view, margin) = (self.view.unwrap_or(found.view), self.margin.unwrap_or(found.margin));
+        input.framing = Framing { view, margin, ..found };
         Ok(())
     }
 
@@ -409,11 +480,8 @@ impl<'a> Plan<'a> {
             format,
             content: Content::Scene,
         });
-        let is_free = |output: &Output| match self.frames {
-            Some(Frames { first, last }) => {
-                (first..=last).all(|frame| output.of_frame(frame).of_scene(&job.names).is_free())
-            }
-            None => output.of_scene(&job.names).is_free(),
+        let is_free = |output: &Output| {
+            self.pictures.iter().all(|picture| output.of_part(&picture.part).of_scene(&job.names).is_free())
         };
         let [name, other] = choices.each_ref().map(|output| output.of_scene(&job.names).target.name());
         let Some(free) = choices.iter().position(is_free) else {
@@ -426,6 +494,56 @@ impl<'a> Plan<'a> {
         }
         Ok(choices[free].clone())
     }
+}
+
+/// A plan and a scene, brought together.
+pub(super) struct Joined {
+    /// The pictures, without what tells those of one scene apart, nor the names of the scene.
+    pub outputs: Vec<Output>,
+    pub settings: RenderSettings,
+    /// Columns and rows, of each size.
+    pub sizes: Vec<(u32, u32)>,
+}
+
+/// The pictures that are asked for of each scene.
+fn pictures_of(args: &RenderArgs) -> Result<Pictures, Failure> {
+    let twice = |option: &str, what: String| {
+        Failure::Usage(format!("{option} names {what} twice; each is a picture of its own, name it once"))
+    };
+    if let Some((_, size)) = args.size.iter().enumerate().find(|(i, size)| args.size[..*i].contains(size)) {
+        return Err(twice("--size", size.to_string()));
+    }
+    let before = |i: usize, view: &NamedView| args.views[..i].iter().any(|other| other.name == view.name);
+    if let Some((_, view)) = args.views.iter().enumerate().find(|(i, view)| before(*i, view)) {
+        return Err(twice("--views", view.name.to_owned()));
+    }
+    let views = match args.turntable {
+        Some(count) => Views::Turntable(count),
+        None if args.views.is_empty() => Views::One,
+        None => Views::Named(args.views.clone()),
+    };
+    Ok(Pictures { frames: args.frames, views, sizes: args.size.clone() })
+}
+
+/// Sees that a picture is not too large and holds what is asked of it.
+fn check_size(crop: Option<Window>, width: u32, height: u32) -> Result<(), Failure> {
+    if let Some(crop) = crop
+        && !inside(crop, width, height)
+    {
+        let Window { x, y, width: w, height: h } = crop;
+        return Err(Failure::Usage(format!(
+            "--crop {x},{y},{w},{h} is not inside the picture, which is {width} x {height} pixels"
+        )));
+    }
+    let (width, height) = crop.map_or((width, height), |crop| (crop.width, crop.height));
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels > PIXEL_LIMIT {
+        return Err(Failure::Usage(format!(
+            "{width} x {height} are {pixels} pixels, and at most {PIXEL_LIMIT} are rendered at once; render parts \
+             of the picture, each with --crop X,Y,WIDTH,HEIGHT"
+        )));
+    }
+    Ok(())
 }
 
 /// The picture of the work is a `.png`.

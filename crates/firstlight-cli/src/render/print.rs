@@ -17,6 +17,11 @@ pub(super) fn run(plan: &Plan, file: Option<&Path>, reading: &ReadingArgs) -> Re
     let [job] = &plan.jobs[..] else {
         return Err(Failure::Usage("--print-scene writes one scene, and several are given; name one".into()));
     };
+    if plan.pictures.sizes.len() > 1 {
+        return Err(Failure::Usage(
+            "--print-scene writes a scene of one size, and --size names several; name one".into(),
+        ));
+    }
     let target = file.map_or(Target::Stdout, Target::of);
     if let Target::File(path) = &target {
         let name = shown(path);
@@ -30,7 +35,7 @@ pub(super) fn run(plan: &Plan, file: Option<&Path>, reading: &ReadingArgs) -> Re
             )));
         }
     }
-    let mut input = input::read(job.scene, reading)?;
+    let mut input = input::read(&job.scene, reading)?;
     plan.join(job, &mut input)?;
     let compiled = input.compile(plan.time, plan.quiet)?;
     show_diagnostics(&compiled.warnings);

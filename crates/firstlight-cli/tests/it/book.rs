@@ -23,7 +23,9 @@ while [ "$count" -gt 0 ]; do
     --width | --height | --size | --crop | --aa | --samples | --frames | --simd)
       value=$1; shift; count=$((count - 1))
       case "$word" in
-        --width | --height | --size) sized=1; [ -n "$crop" ] || value=16 ;;
+        --width | --height | --size)
+          sized=1
+          case "$value" in *,*) value=16,8 ;; *) [ -n "$crop" ] || value=16 ;; esac ;;
         --crop) value=${value%,*,*},8,8 ;;
         --aa) aa=1 value=1 ;;
         --samples) [ "$value" = exact ] || value=4 ;;

@@ -1,6 +1,7 @@
 //! The built program, from outside: each test is named by what it promises.
 
 mod answers;
+mod batch;
 #[cfg(unix)]
 mod book;
 mod buffers;

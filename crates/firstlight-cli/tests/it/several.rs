@@ -76,8 +76,15 @@ fn what_would_be_one_file_is_refused_before_anything_is_rendered() {
         ),
         ("a.toml a.toml -o out/{stem}.png", "would both be written to out/a.png; name it once"),
         // The hint proposes no placeholder that the name has already, nor one that would not help
-        ("a.toml sub/a.toml -o out/{name}.png", "to out/a.toml.png; render them in two calls, to folders of their own"),
-        ("a.toml sub/a.toml -o out/{stem}.png", "to out/a.png; render them in two calls, to folders of their own"),
+        ("a.toml sub/a.toml -o out/{name}.png", "to out/a.toml.png; {parent} in the output's name keeps their folders"),
+        (
+            "a.toml sub/a.toml -o out/{stem}.png",
+            "to out/a.png; {parent} in the output's name keeps their folders apart",
+        ),
+        (
+            "one/a.toml two/one/a.toml -o out/{parent}-{stem}.png",
+            "to out/one-a.png; render them in two calls, to folders of their own",
+        ),
         // A course file says its own output
         ("one.txt two.txt", "one.txt and two.txt would both be written to course.png"),
         ("a.toml a.json --frames 0..1 -o out/{stem}_##.png", "out/a_00.png"),

@@ -81,6 +81,37 @@ fn interrupted_it_leaves_the_old_file_and_no_other() {
     }
 }
 
+/// The log of a run has a line for what was done, and none for what was not.
+#[test]
+fn an_interrupted_run_leaves_the_lines_of_its_summary() {
+    let folder = Folder::with_scene();
+    let long = crate::common::SCENE.replace("width = 36\nheight = 24", "width = 4096\nheight = 4096");
+    folder.put(
+        "long.toml",
+        long.replace("samples = 16", "samples = 4096").replace("antialiasing = 2", "antialiasing = 8"),
+    );
+    let line = "render scene.toml long.toml -o {stem}.png --summary log.jsonl --tile-size 8 --threads 1";
+    let mut command = listening(&folder);
+    let mut child = command.args(line.split_whitespace()).stderr(Stdio::piped()).spawn().unwrap();
+    let stderr = BufReader::new(child.stderr.take().unwrap());
+    // While it goes on
+    let is_written = || std::fs::read(folder.path("log.jsonl")).is_ok_and(|log| log.ends_with(b"\n"));
+    let written = (0..600).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        is_written()
+    });
+    assert!(written, "{:?}", folder.names());
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    let long = Long { child, stderr };
+    long.send("-INT");
+    let (status, said) = long.end();
+    assert_eq!(status.code(), Some(130), "{said}");
+    assert!(said.contains("interrupted in long.toml; 1 of 2 scenes were rendered before it"), "{said}");
+    assert_eq!(folder.names(), ["log.jsonl", "long.toml", "scene.png", "scene.toml"]);
+    let log = String::from_utf8(folder.get("log.jsonl")).unwrap();
+    assert!(log.lines().count() == 1 && log.contains("\"scene.png\"") && log.contains("\"error\":null"), "{log}");
+}
+
 /// In the background and under `nohup` some signals are ignored. The others are not, and leave no more behind than
 /// ever.
 #[test]

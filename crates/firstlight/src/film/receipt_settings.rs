@@ -145,7 +145,10 @@ impl ReceiptSettings {
         let color = |text: &str| numbers(text, ' ').map(|linear: [f64; 3]| ColorDesc::from(linear));
         let background = |text: &str| if text == TRANSPARENT { Some(None) } else { color(text).map(Some) };
         let view = from.optional("view", |text| numbers(text, ' ').map(|[around, above]| View::new(around, above)))?;
-        let framing = |view| Ok(Framing { view, margin: from.required("margin", number)? });
+        let framing = |view| {
+            let distance = from.optional("view_distance", number)?;
+            Ok(Framing { view, margin: from.required("margin", number)?, distance })
+        };
         let crop =
             |text: &str| numbers(text, ',').map(|[x, y, width, height]: [u32; 4]| Window { x, y, width, height });
         let visibility = |text: &str| match text {

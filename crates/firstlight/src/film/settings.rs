@@ -116,16 +116,24 @@ impl RenderSettings {
                 ));
             }
         }
+        let both = self.film_bytes(scene);
+        let fault = || {
+            let Window { width, height, .. } = self.window(scene);
+            format!("{width} x {height} pixels take {both} bytes, more than there is; render parts with a crop")
+        };
+        let bytes = usize::try_from(both).map_err(|_| fault())?;
+        Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| fault())
+    }
+
+    /// Bytes of the film, and of the largest file that can be made of it. For settings that [`check`](Self::check) has
+    /// passed.
+    pub fn film_bytes(&self, scene: &Scene) -> u64 {
         let window = self.window(scene);
         let bytes = |buffers: &[Buffer]| buffers.iter().map(|buffer| buffer.plane().bytes()).sum::<usize>();
         let Passes { picture, unshadowed } = Passes::of(scene, &self.buffers);
         // The films of the passes are in memory while the buffers are computed from them
         let pixel = bytes(&self.buffers).max((bytes(&picture) + bytes(&unshadowed) + bytes(&self.buffers)).div_ceil(2));
-        let both = 2 * window.width as usize * window.height as usize * pixel;
-        Vec::<u8>::new().try_reserve_exact(both).map_err(|_| {
-            let Window { width, height, .. } = window;
-            format!("{width} x {height} pixels take {both} bytes, more than there is; render parts with a crop")
-        })
+        2 * u64::from(window.width) * u64::from(window.height) * pixel as u64
     }
 
     /// The rules by which these settings render a scene.

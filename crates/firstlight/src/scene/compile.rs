@@ -15,7 +15,7 @@ use super::outline::ShapeOutline;
 use super::place::compile_shapes;
 use super::seen_lights::SeenLights;
 use super::studio::StudioSettings;
-use super::textures::{TextureRequests, Textures};
+use super::textures::{TEXTURE_MEMORY, TextureRequests, Textures};
 use super::{Choices, DisplayEncoding, RenderDesc, Scene, SceneDesc, SceneSummary};
 use crate::camera::{Camera, CameraDesc};
 use crate::color::{Display, Encoding, Rgb, ToneMapping};
@@ -45,6 +45,9 @@ pub struct CompileOptions {
     /// Bytes that pictures may take as textures, with their smaller copies; [`TEXTURE_MEMORY`](crate::TEXTURE_MEMORY)
     /// where it is `None`.
     pub texture_memory: Option<u64>,
+    /// Bytes that files, meshes, point sets and textures may take together, as far as that is known before they are made;
+    /// any number of bytes where it is `None`.
+    pub memory: Option<u64>,
     /// In seconds, from -1e9 to 1e9: where the scene has keys, it is compiled as it is at this time.
     pub time: f64,
 }
@@ -108,6 +111,7 @@ impl SceneDesc {
             cache.begin();
         }
         cx.progress = options.progress.clone();
+        cx.memory = options.memory;
         cx.between("time", time, -MAX_TIME, MAX_TIME, Some("the moment to compile, in seconds"));
         // Put the parts of models in place of them; what lies within their files is a file from here on
         let mut files = MeshFiles { cache, ..MeshFiles::default() };
@@ -128,10 +132,12 @@ impl SceneDesc {
     ) -> Option<(Scene, Added)> {
         let (time, cache) = (options.time, files.cache);
         let picture = self.compile_render(cx);
-        let mut textures = TextureRequests::new(self, assets, cache, options.texture_memory);
+        let most = options.texture_memory.unwrap_or(TEXTURE_MEMORY).min(options.memory.unwrap_or(u64::MAX));
+        let mut textures = TextureRequests::new(self, assets, cache, Some(most));
         textures.check(cx);
         let materials = self.compile_materials(cx, &mut textures);
         let textures = textures.finish(cx);
+        cx.take("texture", "textures", textures.bytes);
         let geometry = compile_shapes(self, &materials, cx, assets, &mut files);
         let origin = cx.origin;
         let bounds = geometry.as_ref().and_then(Geometry::bounds).map(|bounds| bounds.map(|corner| corner + origin));
@@ -211,10 +217,14 @@ impl SceneDesc {
         geometry: Option<&Geometry>,
         (source, files): (&SceneDesc, &MeshFiles<'_>),
     ) -> Added {
-        let Framing { view, margin } = options.framing;
+        let Framing { view, margin, distance } = options.framing;
         cx.between("view.azimuth_deg", view.azimuth_deg, -360.0, 360.0, Some("in degrees; 0 is in front"));
         cx.between("view.elevation_deg", view.elevation_deg, -90.0, 90.0, Some("in degrees; 90 is straight above"));
         cx.between("margin", margin, 0.0, Framing::MAX_MARGIN, Some("a part of the picture's shorter side"));
+        if let Some(distance) = distance {
+            let [least, most] = Framing::DISTANCES;
+            cx.between("distance", distance, least, most, Some("from the middle of what is seen, in metres"));
+        }
         if cx.has_errors() {
             return Added::default();
         }

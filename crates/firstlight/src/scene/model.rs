@@ -1,8 +1,8 @@
 //! What a scene is given that it does not say: a camera that sees all of it, and for a bare model a studio.
 
-use super::SceneDesc;
 use super::outline::ShapeOutline;
 use super::studio::{Stage, StudioSettings};
+use super::{Scene, SceneDesc};
 use crate::camera::CameraDesc;
 use crate::light::LightDesc;
 use crate::math::DVec3;
@@ -20,16 +20,22 @@ pub struct View {
 
 impl View {
     /// The views that have names.
-    pub const NAMED: [(&str, View); 7] = [
+    pub const NAMED: [(&str, View); 9] = [
         ("front", View::new(0.0, 0.0)),
         ("back", View::new(180.0, 0.0)),
         ("left", View::new(-90.0, 0.0)),
         ("right", View::new(90.0, 0.0)),
+        // The same
+        ("side", View::new(90.0, 0.0)),
         ("top", View::new(0.0, 90.0)),
         ("bottom", View::new(0.0, -90.0)),
         // Along the diagonal of a cube: the elevation is atan(1 / sqrt 2)
         ("iso", View::new(45.0, 35.264389682754654)),
+        ("three-quarter", View::THREE_QUARTER),
     ];
+
+    /// From the front, a little from the right and from above: the default.
+    const THREE_QUARTER: View = View::new(35.0, 20.0);
 
     /// From these angles, in degrees.
     pub const fn new(azimuth_deg: f64, elevation_deg: f64) -> Self {
@@ -39,6 +45,14 @@ impl View {
     /// The view called `name`.
     pub fn from_name(name: &str) -> Option<View> {
         View::NAMED.iter().find(|(known, _)| *known == name).map(|(_, view)| *view)
+    }
+
+    /// The view of that number, from 0 on, of `count` that a turntable shows, of which this is number 0: the camera
+    /// goes around the y axis in steps of 360 / `count` degrees, towards the right.
+    #[must_use]
+    pub fn turned(self, number: u32, count: u32) -> View {
+        let azimuth = self.azimuth_deg + 360.0 * f64::from(number % count.max(1)) / f64::from(count.max(1));
+        View { azimuth_deg: if azimuth > 360.0 { azimuth - 360.0 } else { azimuth }, ..self }
     }
 
     /// Towards the camera, and what is up in its picture: both unit.
@@ -54,7 +68,7 @@ impl View {
 impl Default for View {
     /// Three quarters: from the front, from the right and from above.
     fn default() -> Self {
-        View::new(35.0, 20.0)
+        View::THREE_QUARTER
     }
 }
 
@@ -65,16 +79,22 @@ pub struct Framing {
     pub view: View,
     /// What is left free at least on each side of the picture, as a part of its shorter side: 0 to 0.45.
     pub margin: f64,
+    /// How far the eye is, in metres, from the middle of the box around what is seen, which it then looks at: see
+    /// [`Scene::turntable_distance`]. `None`: as near as the margin lets it be, with the outline in the middle of the
+    /// picture.
+    pub distance: Option<f64>,
 }
 
 impl Framing {
     /// The widest margin.
     pub const MAX_MARGIN: f64 = 0.45;
+    /// The least and the largest distance.
+    pub(super) const DISTANCES: [f64; 2] = [1e-30, 1e30];
 }
 
 impl Default for Framing {
     fn default() -> Self {
-        Framing { view: View::default(), margin: 0.04 }
+        Framing { view: View::default(), margin: 0.04, distance: None }
     }
 }
 
@@ -135,8 +155,26 @@ impl SceneDesc {
             let middle = (low + high) * 0.5 + seen.origin;
             let stage = Stage { middle, radius: ((high - low) * 0.5).length(), lowest: low.y + seen.origin.y };
             (added.lights, added.ground) = studio.set_up(&stage, looked);
+            // What is empty stands on nothing
+            added.ground = added.ground.filter(|_| bounds.is_some());
         }
         added
+    }
+}
+
+impl Scene {
+    /// The least [distance](Framing::distance) at which all of `count` views of a turntable, of which `framing.view` is
+    /// the first, hold what is seen within their margins: so that it keeps its size and its place while it turns. `None`
+    /// where there is nothing that has an end.
+    pub fn turntable_distance(&self, framing: &Framing, count: u32) -> Option<f64> {
+        let seen = ShapeOutline::new(&self.geometry, self.origin);
+        let bounds = seen.bounds()?;
+        let size = [self.width, self.height].map(f64::from);
+        let of_view = |number| {
+            let framing = Framing { view: framing.view.turned(number, count), ..*framing };
+            Aim::new(&|d| seen.support(d), bounds, &framing, size).distance()
+        };
+        (0..count.max(1)).map(of_view).reduce(f64::max)
     }
 }
 
@@ -166,34 +204,87 @@ fn sin_cos_deg(angle: f64) -> (f64, f64) {
 /// gives another distance; the larger holds, and in the other direction the eye is moved to where the thing's outline
 /// leaves the same on both sides.
 fn framing_of(support: &dyn Fn(DVec3) -> f64, bounds: [DVec3; 2], framing: &Framing, size: [f64; 2]) -> CameraDesc {
-    let [back, up] = framing.view.directions();
-    let right = up.cross(back).normalize();
-    let up_there = back.cross(right);
-    // The tangents of half the fields of view, within the margins
-    let tan_y = pxfm::f_tan(FOV_Y_DEG.to_radians() * 0.5);
-    let margin = framing.margin * size[0].min(size[1]);
-    let [width, height] = size.map(|side| (side - 2.0 * margin) / size[1] * tan_y);
-    // Around the middle of the box: far from the origin nothing is lost
-    let middle = (bounds[0] + bounds[1]) * 0.5;
-    let reach = |d: DVec3| support(d) - middle.dot(d);
-    let touching = |across: DVec3, tan: f64| [reach(across + back * tan), reach(-across + back * tan)];
-    let apart = |across: DVec3, tan: f64| touching(across, tan).iter().sum::<f64>() / (2.0 * tan);
-    // Never so near that the tip of a needle, or what has no size at all, lies in the eye
-    let (front, rear) = (reach(back), -reach(-back));
-    let largest = (bounds[1] - bounds[0]).max_element();
-    let nearest = front + (NEAREST * largest).max(1e-6 * (1.0 + middle.abs().max_element()));
-    let away = apart(right, width).max(apart(up_there, height)).max(nearest);
-    let centre = |across: DVec3, tan: f64| {
-        let [one, other] =
-            touching(across, outline(tan, |tan| touching(across, tan).iter().sum::<f64>() - 2.0 * tan * away));
-        (one - other) * 0.5
+    let aim = Aim::new(support, bounds, framing, size);
+    let Aim { back, up, middle, .. } = aim;
+    let (eye, look_at) = match framing.distance {
+        Some(away) => (middle + back * away, middle),
+        None => aim.nearest(),
     };
-    let axis = middle + right * centre(right, width) + up_there * centre(up_there, height);
-    let mut camera = CameraDesc::new((axis + back * away).to_array());
-    camera.look_at = (axis + back * ((front + rear) * 0.5)).to_array();
+    let mut camera = CameraDesc::new(eye.to_array());
+    camera.look_at = look_at.to_array();
     camera.up = up.to_array();
     camera.fov_y_deg = Some(FOV_Y_DEG);
     camera
+}
+
+/// A thing, and the directions from which it is looked at.
+struct Aim<'a> {
+    support: &'a dyn Fn(DVec3) -> f64,
+    /// The middle of the box around the thing: far from the origin nothing is lost.
+    middle: DVec3,
+    /// The length of the box.
+    largest: f64,
+    /// Towards the eye.
+    back: DVec3,
+    /// What the camera is told is up.
+    up: DVec3,
+    /// To the right and up in the picture, each with the tangent of half the field of view within the margins.
+    across: [(DVec3, f64); 2],
+}
+
+impl<'a> Aim<'a> {
+    fn new(support: &'a dyn Fn(DVec3) -> f64, bounds: [DVec3; 2], framing: &Framing, size: [f64; 2]) -> Self {
+        let [back, up] = framing.view.directions();
+        let right = up.cross(back).normalize();
+        let up_there = back.cross(right);
+        let tan_y = pxfm::f_tan(FOV_Y_DEG.to_radians() * 0.5);
+        let margin = framing.margin * size[0].min(size[1]);
+        let [width, height] = size.map(|side| (side - 2.0 * margin) / size[1] * tan_y);
+        let middle = (bounds[0] + bounds[1]) * 0.5;
+        let largest = (bounds[1] - bounds[0]).max_element();
+        Aim { support, middle, largest, back, up, across: [(right, width), (up_there, height)] }
+    }
+
+    /// The most that `d` . x is over the thing, from its middle.
+    fn reach(&self, d: DVec3) -> f64 {
+        (self.support)(d) - self.middle.dot(d)
+    }
+
+    /// How far the planes that touch the thing on both sides are from the middle.
+    fn touching(&self, across: DVec3, tan: f64) -> [f64; 2] {
+        [self.reach(across + self.back * tan), self.reach(-across + self.back * tan)]
+    }
+
+    /// The least distance along `back` at which nothing of the thing lies in the eye: the tip of a needle, or what has
+    /// no size at all.
+    fn clear(&self) -> f64 {
+        self.reach(self.back) + (NEAREST * self.largest).max(1e-6 * (1.0 + self.middle.abs().max_element()))
+    }
+
+    /// The nearest eye, and what it looks at.
+    fn nearest(&self) -> (DVec3, DVec3) {
+        let apart = |(across, tan): (DVec3, f64)| self.touching(across, tan).iter().sum::<f64>() / (2.0 * tan);
+        let [right, up] = self.across;
+        let away = apart(right).max(apart(up)).max(self.clear());
+        let centre = |(across, tan): (DVec3, f64)| {
+            let over = |tan| self.touching(across, tan).iter().sum::<f64>() - 2.0 * tan * away;
+            let [one, other] = self.touching(across, outline(tan, over));
+            across * ((one - other) * 0.5)
+        };
+        let axis = self.middle + centre(right) + centre(up);
+        let (front, rear) = (self.reach(self.back), -self.reach(-self.back));
+        (axis + self.back * away, axis + self.back * ((front + rear) * 0.5))
+    }
+
+    /// The nearest that an eye is that looks at the middle.
+    fn distance(&self) -> f64 {
+        let of = |(across, tan): (DVec3, f64)| {
+            let [one, other] = self.touching(across, tan);
+            one.max(other) / tan
+        };
+        let [right, up] = self.across;
+        of(right).max(of(up)).max(self.clear())
+    }
 }
 
 /// The tangent from 0 to `most` at which `over`, which is convex and falls from 0 or more to 0 or less, is 0: that of
@@ -275,7 +366,7 @@ mod tests {
             let high = points.iter().copied().reduce(DVec3::max).unwrap_or_default();
             let support = |d: DVec3| points.iter().map(|p| p.dot(d)).fold(f64::NEG_INFINITY, f64::max);
             for (size, margin) in [([300.0, 300.0], 0.04), ([400.0, 100.0], 0.0), ([100.0, 300.0], 0.2)] {
-                let framing = Framing { view: *view, margin };
+                let framing = Framing { view: *view, margin, distance: None };
                 let camera = framing_of(&support, [low, high], &framing, size);
                 let [x, y] = shown(&camera, &points, size);
                 let free = [0, 1].map(|axis| margin * size[0].min(size[1]) / size[axis]);
@@ -299,7 +390,7 @@ mod tests {
     fn a_ball_is_seen_as_round_as_it_is() {
         // The cone around a ball of radius 1 at the distance d has the sine 1 / d
         let support = |d: DVec3| d.length();
-        let framing = Framing { view: View::new(0.0, 0.0), margin: 0.1 };
+        let framing = Framing { view: View::new(0.0, 0.0), margin: 0.1, distance: None };
         let camera = framing_of(&support, [DVec3::NEG_ONE, DVec3::ONE], &framing, [200.0, 100.0]);
         let tan = 0.8 * pxfm::f_tan(FOV_Y_DEG.to_radians() * 0.5);
         let distance = (1.0 + 1.0 / (tan * tan)).sqrt();
@@ -311,8 +402,12 @@ mod tests {
     fn a_point_and_a_line_along_the_view_have_a_camera() {
         for (low, high) in [(DVec3::ONE, DVec3::ONE), (DVec3::NEG_Z, DVec3::Z)] {
             let support = |d: DVec3| low.dot(d).max(high.dot(d));
-            let camera =
-                framing_of(&support, [low, high], &Framing { view: View::new(0.0, 0.0), margin: 0.04 }, [9.0, 9.0]);
+            let camera = framing_of(
+                &support,
+                [low, high],
+                &Framing { view: View::new(0.0, 0.0), ..Framing::default() },
+                [9.0, 9.0],
+            );
             assert!(camera.position[2] > high.z && camera.look_at[2] < camera.position[2], "{camera:?}");
         }
     }
@@ -334,5 +429,45 @@ mod tests {
         // Turned by as much as the camera goes around
         assert_eq!(View::new(90.0, 90.0).directions(), [DVec3::Y, DVec3::NEG_X]);
         assert_eq!(View::from_name("above"), None);
+    }
+
+    #[test]
+    fn a_turntable_holds_what_is_seen_from_all_its_sides() {
+        let points = [[3.0, 0.0, 0.2], [-1.0, 2.0, 0.0], [0.5, -1.0, -0.1], [2.0, 1.0, 0.3]].map(DVec3::from);
+        let low = points.iter().copied().reduce(DVec3::min).unwrap_or_default();
+        let high = points.iter().copied().reduce(DVec3::max).unwrap_or_default();
+        let support = |d: DVec3| points.iter().map(|p| p.dot(d)).fold(f64::NEG_INFINITY, f64::max);
+        for (first, count, size) in [
+            (View::default(), 7, [300.0, 300.0]),
+            (View::new(-350.0, -40.0), 4, [400.0, 100.0]),
+            (View::new(0.0, 90.0), 3, [9.0, 9.0]),
+        ] {
+            let framing = Framing { view: first, margin: 0.1, distance: None };
+            let of = |number| Framing { view: first.turned(number, count), ..framing };
+            let all = (0..count).map(|number| Aim::new(&support, [low, high], &of(number), size).distance());
+            let distance = all.fold(0.0, f64::max);
+            let free = [0, 1].map(|axis| 0.1 * size[0].min(size[1]) / size[axis]);
+            let mut least = f64::INFINITY;
+            for number in 0..count {
+                let camera =
+                    framing_of(&support, [low, high], &Framing { distance: Some(distance), ..of(number) }, size);
+                let middle = (low + high) * 0.5;
+                assert!((DVec3::from(camera.look_at) - middle).length() < 1e-12);
+                assert!(((DVec3::from(camera.position) - middle).length() - distance).abs() < 1e-12 * distance);
+                let [x, y] = shown(&camera, &points, size);
+                for ([a, b], free) in [x, y].into_iter().zip(free) {
+                    least = least.min(a - free).min(1.0 - b - free);
+                }
+            }
+            // No nearer eye would do
+            assert!((-1e-9..1e-9).contains(&least), "{first:?} {size:?}: {least}");
+        }
+    }
+
+    #[test]
+    fn a_turntable_goes_all_around() {
+        let view = View::new(300.0, 10.0);
+        assert_eq!([0, 1, 2, 3].map(|k| view.turned(k, 4).azimuth_deg), [300.0, 30.0, 120.0, 210.0]);
+        assert_eq!((view.turned(4, 4), view.turned(7, 0).elevation_deg), (view, 10.0));
     }
 }

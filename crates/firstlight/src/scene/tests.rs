@@ -66,3 +66,19 @@ fn a_given_mesh_is_that_of_lists() {
     cache.retain_given(&|_| false);
     assert!(cache.given_mesh(&name).is_none());
 }
+
+#[test]
+fn memory_that_is_not_allowed_is_refused() {
+    let desc = SceneDesc::parse("s.toml", SCENE.as_bytes(), &NoAssets).desc;
+    let faults = |memory| {
+        let options = CompileOptions { memory: Some(memory), ..CompileOptions::default() };
+        desc.compile(&NoAssets, &options).map(|_| ()).map_err(|error| error.faults)
+    };
+    // Two meshes of three vertices and a triangle: said of the first that is too much, and once
+    for memory in [0, 1, 300] {
+        let faults = faults(memory).expect_err("it is too little");
+        assert_eq!(faults.len(), 1, "{faults:?}");
+        assert!(faults[0].to_string().contains("--max-memory 1"), "{}", faults[0]);
+    }
+    assert!(faults(1000).is_ok());
+}

@@ -103,6 +103,11 @@ impl PointSetDesc {
             }
         };
         cx.advise_vertex_colors(&data.colors);
+        // A sphere, a colour and a part of the tree
+        const POINT_BYTES: u64 = 80;
+        if !cx.take("file", "these points and their tree", POINT_BYTES * data.positions.len() as u64) {
+            return None;
+        }
         let points = Arc::new(PointSet::new(data, radius as f32));
         if let Some((cache, key)) = place {
             cache.keep(key, &points);

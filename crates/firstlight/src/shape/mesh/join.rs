@@ -15,6 +15,11 @@ use crate::shape::placement::Placement;
 use crate::shape::surface::UV_SETS;
 use crate::shape::triangles::{TriangleTree, can_be_hit};
 
+/// What a mesh takes while its tree is built: a position, a normal and texture coordinates; three indices, the tree, and
+/// what building it needs. Measured on a surface of 500,000 triangles, whose peak this meets within a tenth.
+const VERTEX_BYTES: u64 = 32;
+const TRIANGLE_BYTES: u64 = 120;
+
 /// Joins the meshes of one space.
 #[derive(Default)]
 pub(crate) struct MeshBuilder {
@@ -92,6 +97,10 @@ impl MeshBuilder {
         if counts.iter().any(|count| *count > u32::MAX as usize) {
             let message = "the meshes of one group have more than 4294967295 vertices or triangles together";
             cx.error("file", message, Some("put some of them in a group of their own"));
+            return;
+        }
+        let bytes = VERTEX_BYTES * data.positions.len() as u64 + TRIANGLE_BYTES * data.triangles.len() as u64;
+        if !cx.take("file", "this mesh and its tree", bytes) {
             return;
         }
         let bounds = bounds(&data, transform);

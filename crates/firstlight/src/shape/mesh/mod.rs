@@ -92,10 +92,16 @@ pub(crate) fn read_mesh_bytes(
     file: &FilePath,
     files: &mut MeshFiles<'_>,
 ) -> Option<(Vec<u8>, ContentKey)> {
-    let bytes = match assets.read(&file.0, MAX_MESH_FILE) {
+    let left = cx.memory_left();
+    let bytes = match assets.read(&file.0, MAX_MESH_FILE.min(left)) {
         Ok(bytes) => bytes,
         Err(error) => {
-            unreadable(cx, file, &error);
+            match error {
+                AssetError::TooLarge { size, .. } if left < MAX_MESH_FILE => {
+                    cx.take("file", &format!("the file {:?}", file.0), size);
+                }
+                _ => unreadable(cx, file, &error),
+            }
             return None;
         }
     };
