@@ -101,7 +101,7 @@ pub use light::{
 };
 pub use material::{
     AlphaMode, AmbientDesc, AmbientGradientDesc, BlinnPhongDesc, MaterialCommonDesc, MaterialDesc,
-    MetallicRoughnessDesc, NormalFix, PhongDesc, UnlitDesc,
+    MetallicRoughnessDesc, NormalFix, PhongDesc, ShadowCatcherDesc, UnlitDesc,
 };
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
 pub use render::{LightCounts, RenderStats, render, render_image};

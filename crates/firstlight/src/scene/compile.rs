@@ -22,7 +22,7 @@ use crate::context::{Assets, CompileContext, OnCompile};
 use crate::describe::{Family, SamplesDesc};
 use crate::error::{Diagnostic, SceneError, Severity};
 use crate::light::{Light, LightDesc, check_samples};
-use crate::material::{Ambient, Material};
+use crate::material::{Ambient, Material, MaterialDesc};
 use crate::math::DVec3;
 use crate::shape::{CompileCache, MeshFiles, ShapeDesc};
 use crate::transform::MAX_TIME;
@@ -98,8 +98,9 @@ impl SceneDesc {
         options: &CompileOptions,
     ) -> Option<(Scene, Added)> {
         let time = options.time;
-        // What is compiled for two moments shares what does not move
-        let shared = self.render.motion_to.as_ref().map(|_| CompileCache::default());
+        // What is compiled for two moments, or for two kinds of camera rays, shares what is the same
+        let has_catchers = self.materials.iter().any(|(_, material)| matches!(material, MaterialDesc::ShadowCatcher(_)));
+        let shared = (self.render.motion_to.is_some() || has_catchers).then(CompileCache::default);
         let cache = options.cache.as_ref().or(shared.as_ref());
         if let Some(cache) = cache {
             cache.begin();
@@ -112,7 +113,7 @@ impl SceneDesc {
         let materials = self.compile_materials(cx, &mut textures);
         let textures = textures.finish(cx);
         let mut files = MeshFiles { cache, ..MeshFiles::default() };
-        let geometry = compile_shapes(self, &materials, cx, assets, &mut files);
+        let geometry = compile_shapes(self, &materials, false, cx, assets, &mut files);
         let origin = cx.origin;
         let bounds = geometry.as_ref().and_then(Geometry::bounds).map(|bounds| bounds.map(|corner| corner + origin));
         let added = self.complete(cx, assets, options, &materials, geometry.as_ref());
@@ -162,10 +163,13 @@ impl SceneDesc {
             moment: time,
             time: cx.keyed.then_some(time),
             motion: None,
+            catchers: None,
+            leaves_out_black: false,
             placeholders: textures.placeholders,
             textures: textures.compiled,
             summary,
         };
+        scene.catchers = self.compile_catchers(cx, assets, cache, &scene);
         scene.motion = self.compile_motion(cx, assets, cache, desc, &scene);
         advise(cx, &scene, desc);
         Some((scene, added))
@@ -191,7 +195,7 @@ impl SceneDesc {
         let still = if self.cameras.is_empty() && cx.keyed && options.time != 0.0 {
             let mut at_zero = CompileContext::at_time(0.0);
             let files = &mut MeshFiles { cache: options.cache.as_ref(), ..MeshFiles::default() };
-            compile_shapes(self, materials, &mut at_zero, assets, files).map(|still| (still, at_zero.origin))
+            compile_shapes(self, materials, false, &mut at_zero, assets, files).map(|still| (still, at_zero.origin))
         } else {
             None
         };
