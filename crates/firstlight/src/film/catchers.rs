@@ -32,18 +32,19 @@ pub(crate) struct Shadows {
     /// Pixel by pixel: the part that catchers cover, and their mean alpha there.
     shares: Vec<f32>,
     alphas: Vec<f32>,
+    /// What it took to find them; nothing if that is not asked for.
+    work: Vec<f32>,
 }
 
 /// What arrives of all lights, of which catchers reflect all; and their alpha and the part of a pixel that they cover.
 const LIGHT: Buffer = Buffer::Plane(Plane::Diffuse);
 const COVER: Buffer = Buffer::Plane(Plane::Ambient);
+const WORK: Buffer = Buffer::Plane(Plane::Rays);
 /// The most passes that they take beside that of the picture.
 pub(crate) const PASSES: u64 = 3;
 /// In steps of 1/255 for a tolerance of 1: alphas up to this are within the errors of integrated light, and count as
 /// none; up to twice as much they are taken down, so that nothing jumps.
 const UNSURE: f32 = 0.25;
-/// The part of the pixels of a cell that are darker than the light by which its errors are judged.
-const DARKER: usize = 4;
 
 /// Whether catchers change a buffer: it is the colour, or a part of it.
 fn is_changed(buffer: Buffer) -> bool {
@@ -102,25 +103,30 @@ impl ChosenPixels {
 
 impl Shadows {
     /// Finds them for a window of whole cells of `side` pixels. `pass` renders buffers of a scene there, all of it or
-    /// some pixels. `is_integrated`: whether light is, and alphas within its errors count as none.
+    /// some pixels. `is_integrated`: whether light is, and alphas within its errors count as none. `heat`: whether the
+    /// work is asked for.
     pub fn find(
         scene: &Scene,
         catchers: &Catchers,
         (window, side): (Window, u32),
-        is_integrated: bool,
+        [is_integrated, heat]: [bool; 2],
         mut pass: impl FnMut(&Scene, &[Buffer], Option<ChosenPixels>) -> ControlFlow<(), Film>,
     ) -> ControlFlow<(), Shadows> {
         // What would arrive, and what of each pixel catchers cover
-        let unshadowed = pass(&scene.with_unshadowed_catchers(catchers), &[LIGHT, COVER], None)?;
+        let planes = |mut planes: Vec<Buffer>| {
+            planes.extend(heat.then_some(WORK));
+            planes
+        };
+        let unshadowed = pass(&scene.with_unshadowed_catchers(catchers), &planes(vec![LIGHT, COVER]), None)?;
         let of = |plane: &[f32], channel: usize| plane.iter().skip(channel).step_by(3).copied().collect::<Vec<f32>>();
         let cover = floats(&unshadowed, COVER);
         let (most, shares) = (of(cover, 0), of(cover, 1));
         let all = of(floats(&unshadowed, LIGHT), 0);
         // What arrives, where it is not all the same
         let chosen: Vec<bool> = shares.iter().zip(&all).map(|(share, all)| *share > 0.0 && *all > 0.0).collect();
-        let stops = stops(window, side, &all, &shares);
+        let stops = stops(window, side, &all, &shares).map(|stop| stop + scene.stops_behind_catchers()).collect();
         let shadowed = ChosenPixels { window, chosen: chosen.clone(), stops };
-        let shadowed = pass(&scene.with_lit_catchers(catchers), &[LIGHT], Some(shadowed))?;
+        let shadowed = pass(&scene.with_lit_catchers(catchers), &planes(vec![LIGHT]), Some(shadowed))?;
         let arrives = of(floats(&shadowed, LIGHT), 0);
         let unsure = if is_integrated { UNSURE * scene.tolerance as f32 / 255.0 } else { 0.0 };
         let alpha = |pixel: usize| {
@@ -132,24 +138,44 @@ impl Shadows {
             hidden * (most[pixel] / shares[pixel])
         };
         let alphas = (0..chosen.len()).map(alpha).collect();
-        ControlFlow::Continue(Shadows { window, shares, alphas })
+        let mut work = unshadowed.floats(WORK).map(<[f32]>::to_vec).unwrap_or_default();
+        add_work(&mut work, &shadowed, &chosen);
+        ControlFlow::Continue(Shadows { window, shares, alphas, work })
+    }
+
+    fn is_mixed(&self, pixel: usize) -> bool {
+        self.alphas[pixel] > 0.0 && self.shares[pixel] < 1.0
     }
 
     /// The pixels that catchers in shadow cover in part; `None` if there are none.
     pub fn mixed(&self) -> Option<ChosenPixels> {
-        let is_mixed = |(share, alpha): (&f32, &f32)| *alpha > 0.0 && *share < 1.0;
-        let chosen: Vec<bool> = self.shares.iter().zip(&self.alphas).map(is_mixed).collect();
+        let chosen: Vec<bool> = (0..self.alphas.len()).map(|k| self.is_mixed(k)).collect();
         chosen.contains(&true).then(|| ChosenPixels { window: self.window, chosen, stops: Vec::new() })
     }
 
     /// Lays them over a picture. `black` is the picture with black catchers in the [mixed](Self::mixed) pixels.
-    pub fn cover(&self, picture: &mut Film, black: Option<&Film>) {
+    pub fn cover(mut self, picture: &mut Film, black: Option<&Film>) {
+        if let Some(black) = black {
+            let chosen: Vec<bool> = (0..self.alphas.len()).map(|k| self.is_mixed(k)).collect();
+            add_work(&mut self.work, black, &chosen);
+        }
         let Window { width, .. } = picture.window;
-        let pixels: Vec<([u32; 2], usize)> =
-            picture.window.pixels().map(|at| (at, index(self.window, at))).filter(|(_, k)| self.alphas[*k] > 0.0).collect();
+        let pixels: Vec<([u32; 2], usize)> = picture
+            .window
+            .pixels()
+            .map(|at| (at, index(self.window, at)))
+            .filter(|(_, k)| self.alphas[*k] > 0.0)
+            .collect();
         let [x, y] = [picture.window.x, picture.window.y];
         for (_, buffer, numbers) in &mut picture.planes {
-            let (true, PlaneVec::Floats(numbers)) = (is_changed(*buffer), numbers) else { continue };
+            let PlaneVec::Floats(numbers) = numbers else { continue };
+            if *buffer == WORK {
+                let all = picture.window.pixels().map(|at| index(self.window, at));
+                numbers.iter_mut().zip(all).for_each(|(sum, k)| *sum += self.work[k]);
+            }
+            if !is_changed(*buffer) {
+                continue;
+            }
             let channels = buffer.plane().channels().len();
             // A black surface that fills a pixel has its alpha, and no light
             let alpha_at = match buffer.plane() {
@@ -162,7 +188,7 @@ impl Shadows {
                 let at = ((j - y) * width + i - x) as usize * channels;
                 for (channel, number) in numbers[at..][..channels].iter_mut().enumerate() {
                     let black = match black {
-                        Some(black) if self.shares[*k] < 1.0 => black[k * channels + channel],
+                        Some(black) if self.is_mixed(*k) => black[k * channels + channel],
                         _ if channel == alpha_at => 1.0,
                         _ => 0.0,
                     };
@@ -173,18 +199,24 @@ impl Shadows {
     }
 }
 
-/// Cell by cell: the stops that raise the light on catchers to about 1, where it is among the darkest of the cell.
-fn stops(window: Window, side: u32, all: &[f32], shares: &[f32]) -> Vec<i32> {
-    let of_cell = |cell: Tile| {
+/// Adds the work of a pass to that of all, in the pixels that it had.
+fn add_work(all: &mut [f32], of: &Film, chosen: &[bool]) {
+    let work = of.floats(WORK).unwrap_or_default();
+    all.iter_mut().zip(work).zip(chosen).filter(|(_, is)| **is).for_each(|((sum, work), _)| *sum += work);
+}
+
+/// Cell by cell: the stops that raise the light on catchers to between 1/2 and 1, the median of the cell.
+fn stops(window: Window, side: u32, all: &[f32], shares: &[f32]) -> impl Iterator<Item = i32> {
+    let of_cell = move |cell: Tile| {
         let pixels = cell.pixels().map(|at| index(window, at)).filter(|k| shares[*k] > 0.0 && all[*k] > 0.0);
         let mut lights: Vec<f32> = pixels.map(|k| all[k] / shares[k]).collect();
-        let place = lights.len() / DARKER;
         if lights.is_empty() {
             return 0;
         }
-        let (_, light, _) = lights.select_nth_unstable_by(place, f32::total_cmp);
-        // The exponent of the number
-        127 - (light.to_bits() >> 23) as i32
+        let middle = lights.len() / 2;
+        let (_, light, _) = lights.select_nth_unstable_by(middle, f32::total_cmp);
+        // One less than the exponent, turned round
+        126 - (light.to_bits() >> 23) as i32
     };
-    window.parts(side, side).map(of_cell).collect()
+    window.parts(side, side).map(of_cell)
 }

@@ -14,7 +14,7 @@ const MOST_LISTED: usize = 1000;
 
 /// How many entries **Pixels** has in the changelog, over all versions. It is part of the version in a receipt, so that
 /// two builds whose pictures differ never have the same version. The test below compares it with the changelog.
-const PIXELS_ENTRIES: u32 = 104;
+const PIXELS_ENTRIES: u32 = 105;
 
 /// The version in receipts.
 pub(super) fn version() -> String {
@@ -23,6 +23,8 @@ pub(super) fn version() -> String {
 
 /// The background entry of a transparent background.
 pub(super) const TRANSPARENT: &str = "transparent";
+/// The entry of a scene with shadow catchers.
+pub(super) const SHADOW_CATCHERS: &str = "shadow_catchers";
 /// The visibility entry of the plain renderer.
 pub(super) const REFERENCE: &str = "reference";
 
@@ -71,6 +73,9 @@ impl Scene {
         }
         if self.camera.film_shift() != [0.0; 2] {
             entries.push(("film_shift", numbers(self.camera.film_shift())));
+        }
+        if self.catchers.is_some() {
+            entries.push((SHADOW_CATCHERS, "shown".to_owned()));
         }
         if !self.placeholders.is_empty() {
             entries.push(("placeholders", self.placeholders.join(" ")));

@@ -409,7 +409,9 @@ impl<'a> DirectLighting<'a> {
         self.points.extend(members.iter().map(|k| *of.point(*k)));
         self.integrals.clear();
         let shadows = visibility != Visibility::Full;
-        let Some(task) = self.lights.task(of.light, of.lobe, shadows, self.steps) else { unreachable!("it has an area") };
+        let Some(task) = self.lights.task(of.light, of.lobe, shadows, self.steps) else {
+            unreachable!("it has an area")
+        };
         let task = LightTask { sums, allowed: self.allowed, ..task };
         self.evaluator.evaluate(self.level, &task, &self.points, &mut self.integrals);
     }

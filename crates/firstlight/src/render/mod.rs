@@ -30,21 +30,21 @@ mod visible_shape;
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
-use std::sync::{Arc, Mutex};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 
 pub use counts::{LightCounts, RenderStats};
 
 use crate::accel::SimdLevel;
+use crate::film::catchers::{self, ChosenPixels, Shadows};
 use crate::film::coverage::{Coverage, CoveragePlanes};
 use crate::film::hits::PixelHits;
 use crate::film::passes::Passes;
 use crate::film::resolve::TermSums;
 use crate::film::settings::Renderer;
 use crate::film::tile::{self, Tile};
-use crate::film::catchers::{self, ChosenPixels, Shadows};
 use crate::film::{AaMode, Film, FilmTile, RenderSettings, centers};
-use crate::image::{Buffer, Image, Window};
+use crate::image::{Buffer, Image, Plane, Window};
 use crate::math::Ray;
 use crate::parallel;
 use crate::scene::Scene;
@@ -100,11 +100,14 @@ pub fn render(
         let cells = catchers::whole_cells(scene, window, CELL);
         let is_integrated =
             !settings.renderer().samples_all() && scene.lights.iter().any(|light| light.is_integrated());
-        let shadows = Shadows::find(scene, catchers, (cells, CELL), is_integrated, |scene, planes, chosen| {
+        let heat = passes.picture.contains(&Plane::Rays.into());
+        let kinds = [is_integrated, heat];
+        let shadows = Shadows::find(scene, catchers, (cells, CELL), kinds, |scene, planes, chosen| {
             let film = pass(scene, (cells, chosen), planes)?;
             ControlFlow::Continue(film.expect("it has planes"))
         })?;
-        let changed = catchers::changed(&passes.picture);
+        let mut changed = catchers::changed(&passes.picture);
+        changed.extend(heat.then_some(Buffer::from(Plane::Rays)));
         let black = match shadows.mixed() {
             Some(mixed) => pass(&scene.with_black_catchers(catchers), (cells, Some(mixed)), &changed)?,
             None => None,

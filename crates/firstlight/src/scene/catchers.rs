@@ -26,6 +26,8 @@ pub(crate) struct Catchers {
 /// By so many stops light is raised where nothing is known of how much there is: into the part of the curve of
 /// [`DisplaySteps`](crate::color::DisplaySteps) beyond white, where errors count as parts of the value.
 const RAISED: f64 = 40.0;
+/// Shadows over a dark background are as exact as over one so many stops below white: other things may be behind them.
+const MOST_STOPS: i32 = 4;
 /// The part of the tolerance that the light without shadows may be off: it takes little time, and what is divided by it
 /// is to be as exact as the picture is.
 const PART_OF_TOLERANCE: f64 = 0.25;
@@ -60,20 +62,35 @@ impl Scene {
     }
 
     /// The scene in which shadow catchers are white, all else is black and lights are gray. Of ambient light it has 1;
-    /// see [`ShadowCatcher`](crate::material::ShadowCatcher). Errors count as parts of the light that arrives.
+    /// see [`ShadowCatcher`](crate::material::ShadowCatcher). What is white is shown as the background is, or as alpha.
     pub(crate) fn with_lit_catchers(&self, catchers: &Catchers) -> Scene {
         let mut scene = self.with_black_catchers(catchers);
         scene.materials.iter_mut().for_each(|material| *material = material.as_caught());
         scene.lights.iter_mut().for_each(Light::make_gray);
         scene.ambient = Ambient::new(Rgb::WHITE, Rgb::WHITE);
-        scene.display = Display { encoding: Encoding::Linear, exposure: RAISED, tone_mapping: ToneMapping::None };
+        if self.transparent {
+            scene.display = Display { encoding: Encoding::Linear, exposure: 0.0, tone_mapping: ToneMapping::None };
+        }
         scene
     }
 
-    /// The same, in which nothing casts shadows.
+    /// How bright what is seen past catchers is shown, in stops: that of the background, rounded up; 0 of a transparent
+    /// or a black one, or of one that is brighter than white.
+    pub(crate) fn stops_behind_catchers(&self) -> i32 {
+        let Rgb { r, g, b } = self.background;
+        let shown = r.max(g).max(b) * self.display.factor() as f32;
+        if self.transparent || !(shown > 0.0 && shown < 1.0) {
+            return 0;
+        }
+        // One more than the exponent
+        ((shown.to_bits() >> 23) as i32 - 126).max(-MOST_STOPS)
+    }
+
+    /// The same, in which nothing casts shadows. Errors count as parts of the light that arrives.
     pub(crate) fn with_unshadowed_catchers(&self, catchers: &Catchers) -> Scene {
         let mut scene = self.with_lit_catchers(catchers);
         scene.lights.iter_mut().for_each(|light| light.shadows = false);
+        scene.display = Display { encoding: Encoding::Linear, exposure: RAISED, tone_mapping: ToneMapping::None };
         scene.tolerance *= PART_OF_TOLERANCE;
         scene
     }

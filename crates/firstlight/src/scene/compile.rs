@@ -99,7 +99,8 @@ impl SceneDesc {
     ) -> Option<(Scene, Added)> {
         let time = options.time;
         // What is compiled for two moments, or for two kinds of camera rays, shares what is the same
-        let has_catchers = self.materials.iter().any(|(_, material)| matches!(material, MaterialDesc::ShadowCatcher(_)));
+        let has_catchers =
+            self.materials.iter().any(|(_, material)| matches!(material, MaterialDesc::ShadowCatcher(_)));
         let shared = (self.render.motion_to.is_some() || has_catchers).then(CompileCache::default);
         let cache = options.cache.as_ref().or(shared.as_ref());
         if let Some(cache) = cache {

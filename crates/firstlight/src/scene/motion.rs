@@ -170,8 +170,14 @@ impl SceneDesc {
         if cx.keyed && time != here.moment {
             let at = &mut CompileContext::at_time(time);
             at.progress = cx.progress.clone();
-            let geometry =
-                compile_shapes(self, &here.materials, false, at, assets, &mut MeshFiles { cache, ..MeshFiles::default() });
+            let geometry = compile_shapes(
+                self,
+                &here.materials,
+                false,
+                at,
+                assets,
+                &mut MeshFiles { cache, ..MeshFiles::default() },
+            );
             there.origin = at.origin;
             there.camera = completed.compile_camera(at, here.width, here.height, geometry.is_some());
             there.lights = completed.compile_lights(at);
