@@ -83,40 +83,47 @@ pub fn render(
     // A pixel is done when it is in every pass
     let of_catchers = if catchers.is_some() { catchers::PASSES } else { 0 };
     let count = u64::from(!passes.picture.is_empty()) + u64::from(!passes.unshadowed.is_empty()) + of_catchers;
+    let pixels = u64::from(window.width) * u64::from(window.height);
     let (mut before, mut all_stats) = (0, None);
     let mut pass = |scene: &Scene, part: (Window, Option<ChosenPixels>), planes: &[Buffer]| {
         if planes.is_empty() {
             return ControlFlow::Continue(None);
         }
-        let progress = |done, all| progress((before * all + done) / count, all);
+        let progress = |done, all| progress((before * pixels + done * pixels / all) / count, pixels);
         let (film, stats) = expose(scene, settings, part, planes, &progress)?;
         before += 1;
         all_stats = Some(all_stats.map_or(stats, |all: RenderStats| all.and(&stats)));
         ControlFlow::Continue(Some(film))
     };
     let picture = pass(scene, (window, None), &passes.picture)?;
-    let mut picture = picture.unwrap_or_else(|| Film::new(scene, window, &[]));
+    let picture = picture.unwrap_or_else(|| Film::new(scene, window, &[]));
+    let mut shadows = None;
     if let Some(catchers) = catchers {
         let cells = catchers::whole_cells(scene, window, CELL);
         let is_integrated =
             !settings.renderer().samples_all() && scene.lights.iter().any(|light| light.is_integrated());
         let heat = passes.picture.contains(&Plane::Rays.into());
         let kinds = [is_integrated, heat];
-        let shadows = Shadows::find(scene, catchers, (cells, CELL), kinds, |scene, planes, chosen| {
+        let found = Shadows::find(scene, catchers, (cells, CELL), kinds, |scene, planes, chosen| {
             let film = pass(scene, (cells, chosen), planes)?;
             ControlFlow::Continue(film.expect("it has planes"))
         })?;
         let mut changed = catchers::changed(&passes.picture);
         changed.extend(heat.then_some(Buffer::from(Plane::Rays)));
-        let black = match shadows.mixed() {
+        let black = match found.mixed() {
             Some(mixed) => pass(&scene.with_black_catchers(catchers), (cells, Some(mixed)), &changed)?,
             None => None,
         };
-        shadows.cover(&mut picture, black.as_ref());
+        shadows = Some((found, black));
     }
     let unshadowed = pass(&scene.without_shadows(), (window, None), &passes.unshadowed)?;
     let stats = all_stats.expect("there is a pass for every buffer");
-    ControlFlow::Continue((Passes::develop(scene, &settings.buffers, picture, unshadowed.as_ref()), stats))
+    let cover = |picture: &mut Film| {
+        if let Some((shadows, black)) = shadows {
+            shadows.cover(picture, black.as_ref());
+        }
+    };
+    ControlFlow::Continue((Passes::develop(scene, &settings.buffers, picture, unshadowed.as_ref(), cover), stats))
 }
 
 /// Renders some planes of a window, or of some pixels of it, in one pass.

@@ -2,7 +2,7 @@
 //!
 //! In the scene itself camera rays pass them as if they were not there. Three more scenes have them, all with the same
 //! occluders: two in which they are white and all else is black, with and without shadows, and one in which they are
-//! black themselves. [`film/catchers.rs`](crate::film) makes the picture of all of them.
+//! black themselves. `film/catchers.rs` makes the picture of all of them.
 
 use std::sync::Arc;
 
