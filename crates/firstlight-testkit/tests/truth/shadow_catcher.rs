@@ -75,7 +75,11 @@ fn an_umbra_is_black_and_alpha_makes_it_lighter() {
     assert_eq!(alpha(umbra), 1.0);
     let lighter = format!("{DOWN}{}{umbra}", GROUND.replace("material = \"ground\"", "material = \"light\""));
     assert_eq!(pixel_of(&lighter, "transparent = true", &RenderSettings::default()), [0.0, 0.0, 0.0, 0.6]);
-    assert_eq!(pixel_of(&lighter, "ambient = 9\nbackground = 1", &RenderSettings::default()), [0.4, 0.4, 0.4, 1.0]);
+    let over_white = pixel_of(&lighter, "ambient = 9\nbackground = 1", &RenderSettings::default());
+    assert!(
+        over_white[..3].iter().all(|channel| (channel - 0.4).abs() < 1e-6) && over_white[3] == 1.0,
+        "{over_white:?}"
+    );
 }
 
 #[test]
@@ -159,8 +163,8 @@ fn set(ground: &str, render: &str, lights: &str) -> String {
         radius = 0.7
         material = "veil"
         [[group.post.box]]
-        min = [-0.2, 0, -0.2]
-        max = [0.2, 1, 0.2]
+        center = [0, 0.5, 0]
+        size = [0.4, 1, 0.4]
         material = "metal"
         [[group.post.disk]]
         center = [0, 1.01, 0]
@@ -246,13 +250,13 @@ fn the_background_beside_things_in_light_is_untouched() {
 
 #[test]
 fn pictures_of_integrated_light_are_near_the_converged_ones() {
-    for lights in [three(""), many()] {
+    for (lights, samples) in [(three(""), "samples = 1024"), (many(), "samples = 64")] {
         let render = "transparent = true";
         let exact = picture(&scene(&set(CATCHER, render, &lights)), &RenderSettings::default());
-        let samples = lights
-            .replace("strength", "samples = 1024\nstrength")
-            .replace("samples = 1024\nstrength = 6\n", "strength = 6\n");
-        let truth = picture(&scene(&set(CATCHER, render, &samples)), &every_ray());
+        // The last one of three has no extent
+        let sampled = lights.replace("strength", &format!("{samples}\nstrength"));
+        let sampled = sampled.replace(&format!("{samples}\nstrength = 6"), "strength = 6");
+        let truth = picture(&scene(&set(CATCHER, render, &sampled)), &every_ray());
         let off: Vec<f64> =
             exact.pixels.iter().zip(&truth.pixels).map(|(a, b)| f64::from(255.0 * (a[3] - b[3]).abs())).collect();
         let rms = (off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64).sqrt();
