@@ -19,10 +19,15 @@ pub fn run(args: &RelightArgs) -> Result<(), Failure> {
     let ready = outputs.iter().map(|(target, _)| target.ready()).collect::<Result<Vec<_>, _>>()?;
     let stored = difference::read(&args.file)?;
     let work = |why: String| Failure::Work(format!("{}: {why}", shown(&args.file)));
-    let Relit { image, display, receipt } = relight(&stored, &args.light).map_err(|e| work(e.to_string()))?;
+    let Relit { image, display, receipt, keeps_shadows } =
+        relight(&stored, &args.light).map_err(|e| work(e.to_string()))?;
     if FileSettings::of(&stored.receipt).half && !args.quiet {
         let name = shown(&args.file);
         say(format_args!("note: {name} holds its lights in 16-bit floats; the picture is as exact as those"));
+    }
+    if keeps_shadows && !args.light.is_empty() && !args.quiet {
+        let name = shown(&args.file);
+        say(format_args!("note: the shadows on shadow catchers are those of {name}: render it again to change them"));
     }
     let display = Display { exposure: args.exposure.unwrap_or(display.exposure), ..display };
     let watch = Watch::begin();

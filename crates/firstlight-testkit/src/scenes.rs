@@ -191,13 +191,13 @@ pub fn common(shape: &mut ShapeDesc) -> Common<'_> {
     of!(Sphere Parallelogram Plane Disk Rectangle Box Cylinder Cone Torus Mesh PointSet Instance Model)
 }
 
-/// What materials of all kinds can say, but for those that are unlit.
+/// What materials of all kinds can say, but for those that are unlit and shadow catchers.
 pub fn common_of(material: &mut MaterialDesc) -> Option<&mut MaterialCommonDesc> {
     match material {
         MaterialDesc::Phong(desc) => Some(&mut desc.common),
         MaterialDesc::BlinnPhong(desc) => Some(&mut desc.common),
         MaterialDesc::MetallicRoughness(desc) => Some(&mut desc.common),
-        MaterialDesc::Unlit(_) => None,
+        MaterialDesc::Unlit(_) | MaterialDesc::ShadowCatcher(_) => None,
     }
 }
 

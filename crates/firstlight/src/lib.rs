@@ -104,7 +104,7 @@ pub use light::{
 };
 pub use material::{
     AlphaMode, AmbientDesc, AmbientGradientDesc, BlinnPhongDesc, MaterialCommonDesc, MaterialDesc,
-    MetallicRoughnessDesc, NormalFix, PhongDesc, UnlitDesc,
+    MetallicRoughnessDesc, NormalFix, PhongDesc, ShadowCatcherDesc, UnlitDesc,
 };
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
 pub use model::{MtlMaterials, MtlSettings, read_mtl};

@@ -28,6 +28,7 @@ mod normals;
 mod proved;
 mod relight;
 mod robust;
+mod shadow_catcher;
 mod terminator;
 mod terms;
 mod uv_sets;

@@ -58,6 +58,11 @@ impl Rgb {
         Self::new(v, v, v)
     }
 
+    /// How bright it is: Y of Rec. 709.
+    pub(crate) fn luminance(self) -> f32 {
+        0.2126 * self.r + 0.7152 * self.g + 0.0722 * self.b
+    }
+
     /// The smaller of two, channel by channel.
     #[inline(always)]
     pub(crate) fn min(self, o: Rgb) -> Rgb {

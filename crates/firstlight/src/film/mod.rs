@@ -3,6 +3,7 @@
 //! Before it stands the scene; after it, the renderer, which adds light. Planes that no light is needed for are filled
 //! here: by [`centers`] from centre rays, by [`coverage`] from all camera rays.
 
+pub(crate) mod catchers;
 pub(crate) mod centers;
 mod coco;
 pub(crate) mod coverage;
@@ -19,6 +20,7 @@ pub(crate) mod settings;
 pub(crate) mod tile;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 pub use coco::Coco;
 pub use heat::Heat;
@@ -32,6 +34,7 @@ use crate::image::{
     Window,
 };
 use crate::scene::Scene;
+use catchers::ChosenPixels;
 use resolve::TermSums;
 use tile::Tile;
 
@@ -47,6 +50,8 @@ pub struct Film {
 /// The pixels of one tile.
 pub(crate) struct FilmTile {
     pub tile: Tile,
+    /// Those of its pixels that are asked for; `None`: all.
+    pub chosen: Option<Arc<ChosenPixels>>,
     planes: Vec<(Buffer, PlaneVec)>,
 }
 
@@ -183,8 +188,19 @@ impl Film {
 
 impl FilmTile {
     /// An empty tile with the same planes.
-    pub fn new(tile: Tile, planes: &[Buffer]) -> Self {
-        FilmTile { tile, planes: empty(planes, tile) }
+    pub fn new(tile: Tile, planes: &[Buffer], chosen: Option<Arc<ChosenPixels>>) -> Self {
+        FilmTile { tile, chosen, planes: empty(planes, tile) }
+    }
+
+    /// Whether a pixel of the film is asked for.
+    #[inline(always)]
+    pub fn asks(&self, at: [u32; 2]) -> bool {
+        self.chosen.as_ref().is_none_or(|chosen| chosen.has(at))
+    }
+
+    /// Whether any of its pixels is.
+    pub fn asks_any(&self) -> bool {
+        self.chosen.as_ref().is_none_or(|chosen| chosen.has_any(self.tile.pixels()))
     }
 
     /// The index of a pixel of the film in the planes of the tile.

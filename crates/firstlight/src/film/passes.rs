@@ -46,28 +46,36 @@ impl Passes {
         passes
     }
 
-    /// The film of the buffers `asked`, from the films of the passes.
-    pub fn develop(scene: &Scene, asked: &[Buffer], mut picture: Film, unshadowed: Option<&Film>) -> Film {
+    /// The film of the buffers `asked`, from the films of the passes. `cover` lays what hides parts of the picture over
+    /// it: not over the visibility of lights.
+    pub fn develop(
+        scene: &Scene,
+        asked: &[Buffer],
+        mut picture: Film,
+        unshadowed: Option<&Film>,
+        cover: impl FnOnce(&mut Film),
+    ) -> Film {
         let without = |of: &[Buffer]| of.iter().filter_map(|of| unshadowed?.floats(*of)).collect::<Vec<_>>();
-        for buffer in asked.iter().copied().filter(|buffer| !is_rendered(*buffer)) {
-            let numbers = match arriving(buffer) {
-                Some(of) => {
-                    let with: Vec<&[f32]> = of.iter().filter_map(|of| picture.floats(*of)).collect();
-                    let mut shares = shares(&with, &without(&of));
-                    if let Some(light) = may_be_left_out(scene, buffer) {
-                        trace_left_out_light(scene, light, &picture, &with, &mut shares);
-                    }
-                    shares
-                }
-                None if buffer == Plane::Rest.into() => {
-                    let terms = beside_rest(scene, asked).into_iter();
-                    let (terms, mut numbers): (Vec<Buffer>, Vec<Vec<f32>>) =
-                        terms.filter_map(|term| Some((term, picture.floats(term)?.to_vec()))).unzip();
-                    let rest = rest(picture.floats(Plane::Color.into()).unwrap_or_default(), &mut numbers);
-                    terms.into_iter().zip(numbers).for_each(|(term, numbers)| picture.put(scene, term, numbers));
-                    rest
-                }
-                None => without(&[buffer.with_part(None)]).concat(),
+        let made = || asked.iter().copied().filter(|buffer| !is_rendered(*buffer));
+        for (buffer, of) in made().filter_map(|buffer| Some((buffer, arriving(buffer)?))) {
+            let with: Vec<&[f32]> = of.iter().filter_map(|of| picture.floats(*of)).collect();
+            let mut shares = shares(&with, &without(&of));
+            if let Some(light) = may_be_left_out(scene, buffer) {
+                trace_left_out_light(scene, light, &picture, &with, &mut shares);
+            }
+            picture.put(scene, buffer, shares);
+        }
+        cover(&mut picture);
+        for buffer in made().filter(|buffer| arriving(*buffer).is_none()) {
+            let numbers = if buffer == Plane::Rest.into() {
+                let terms = beside_rest(scene, asked).into_iter();
+                let (terms, mut numbers): (Vec<Buffer>, Vec<Vec<f32>>) =
+                    terms.filter_map(|term| Some((term, picture.floats(term)?.to_vec()))).unzip();
+                let rest = rest(picture.floats(Plane::Color.into()).unwrap_or_default(), &mut numbers);
+                terms.into_iter().zip(numbers).for_each(|(term, numbers)| picture.put(scene, term, numbers));
+                rest
+            } else {
+                without(&[buffer.with_part(None)]).concat()
             };
             picture.put(scene, buffer, numbers);
         }

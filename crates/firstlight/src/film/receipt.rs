@@ -23,6 +23,8 @@ pub(super) fn version() -> String {
 
 /// The background entry of a transparent background.
 pub(super) const TRANSPARENT: &str = "transparent";
+/// The entry of a scene with shadow catchers.
+pub(super) const SHADOW_CATCHERS: &str = "shadow_catchers";
 /// The visibility entry of the plain renderer.
 pub(super) const REFERENCE: &str = "reference";
 
@@ -69,6 +71,9 @@ impl Scene {
         }
         if self.camera.film_shift() != [0.0; 2] {
             entries.push(("film_shift", numbers(self.camera.film_shift())));
+        }
+        if self.catchers.is_some() {
+            entries.push((SHADOW_CATCHERS, "shown".to_owned()));
         }
         if !self.placeholders.is_empty() {
             entries.push(("placeholders", self.placeholders.join(" ")));

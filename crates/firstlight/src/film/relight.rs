@@ -13,6 +13,7 @@ use crate::image::{Buffer, Image, LightPart, Plane, PlaneVec, Receipt, StoredPla
 use crate::light::{Light, LightScale, MAX_LIGHT};
 use crate::scene::{MAX_ANTIALIASING, Scene};
 
+use super::receipt::SHADOW_CATCHERS;
 use super::resolve::Emission;
 use super::settings::RenderSettings;
 
@@ -36,6 +37,8 @@ pub struct Relit {
     pub display: Display,
     /// That of the file, with the changes.
     pub receipt: Receipt,
+    /// Whether the scene has shadow catchers: their shadows are those of the lights as they were.
+    pub keeps_shadows: bool,
 }
 
 /// Why a picture cannot be lit again, with what to do.
@@ -113,7 +116,8 @@ fn floats<'a>(file: &'a StoredPlanes, name: &str, channels: usize) -> Result<&'a
 /// order.
 ///
 /// The result is what a render of the changed scene gives: with its bits where all lights are sampled and each camera
-/// ray is lit by itself, and within the tolerance otherwise.
+/// ray is lit by itself, and within the tolerance otherwise. Shadows on shadow catchers stay what they were: how the
+/// lights weigh there is in no buffer.
 ///
 /// # Errors
 /// The file lacks something; there is no such light; a strength or a colour that cannot be; a light that sent nothing
@@ -146,7 +150,8 @@ pub fn relight(file: &StoredPlanes, changes: &[(String, LightChange)]) -> Result
     let mut receipt = Receipt { entries: file.receipt.entries.iter().filter(|(key, _)| own(key)).cloned().collect() };
     receipt.entries.push((RELIT.into(), words(changes)));
     let image = Image { film: file.film, window: file.window, pixels };
-    Ok(Relit { image, display, receipt })
+    let keeps_shadows = file.receipt.get(SHADOW_CATCHERS).is_some();
+    Ok(Relit { image, display, receipt, keeps_shadows })
 }
 
 /// What was changed, as a JSON dictionary of lists.

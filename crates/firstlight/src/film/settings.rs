@@ -2,6 +2,7 @@
 
 use std::num::NonZeroUsize;
 
+use super::catchers;
 use super::passes::Passes;
 use crate::accel::SimdLevel;
 use crate::describe::words;
@@ -130,7 +131,12 @@ impl RenderSettings {
     pub fn film_bytes(&self, scene: &Scene) -> u64 {
         let window = self.window(scene);
         let bytes = |buffers: &[Buffer]| buffers.iter().map(|buffer| buffer.plane().bytes()).sum::<usize>();
-        let Passes { picture, unshadowed } = Passes::of(scene, &self.buffers);
+        let Passes { mut picture, unshadowed } = Passes::of(scene, &self.buffers);
+        if scene.catchers.is_some() {
+            // Those in front of black catchers, and the light on catchers with and without shadows
+            picture.extend(catchers::changed(&picture));
+            picture.extend([Plane::Ambient, Plane::Diffuse, Plane::Diffuse].map(Buffer::from));
+        }
         // The films of the passes are in memory while the buffers are computed from them
         let pixel = bytes(&self.buffers).max((bytes(&picture) + bytes(&unshadowed) + bytes(&self.buffers)).div_ceil(2));
         2 * u64::from(window.width) * u64::from(window.height) * pixel as u64

@@ -279,6 +279,13 @@ pub struct LightSample {
 pub(crate) const MIN_DISTANCE2: f32 = 1e-30;
 
 impl Light {
+    /// Makes it as gray as it is bright.
+    pub(crate) fn make_gray(&mut self) {
+        for light in [&mut self.scale, &mut self.intensity, &mut self.radiance] {
+            *light = Rgb::gray(light.luminance());
+        }
+    }
+
     /// Its area, if it has one, which is sampled or integrated: what the camera can see of it, and what can stand in
     /// the way of others. Without one it comes from one point, or from one direction: one sample is all of it.
     /// A light of that place and shape, of which `said` is how much light one sample is, and all of it.

@@ -15,6 +15,7 @@ mod moments;
 mod normal_mapping;
 mod phong;
 mod shading_point;
+mod shadow_catcher;
 mod unlit;
 mod uv_sets;
 
@@ -35,6 +36,7 @@ pub(crate) use moments::{Colors, LightTerm, MOMENTS, Moments, PARTS, PerMoment};
 pub use normal_mapping::{NormalFix, NormalMapping};
 pub use phong::{PhongDesc, PhongLobe};
 pub(crate) use shading_point::ShadingPoint;
+pub use shadow_catcher::{ShadowCatcher, ShadowCatcherDesc};
 pub use unlit::UnlitDesc;
 pub(crate) use uv_sets::UvSetUse;
 
@@ -58,6 +60,8 @@ family! {
         MetallicRoughness(MetallicRoughnessDesc) = "metallic-roughness",
         /// `[material.unlit.NAME]`
         Unlit(UnlitDesc) = "unlit",
+        /// `[material.shadow-catcher.NAME]`
+        ShadowCatcher(ShadowCatcherDesc) = "shadow-catcher",
     }
 }
 
@@ -68,6 +72,7 @@ impl MaterialDesc {
             MaterialDesc::BlinnPhong(desc) => desc.compile(cx, params),
             MaterialDesc::MetallicRoughness(desc) => desc.compile(cx, params),
             MaterialDesc::Unlit(desc) => desc.compile(cx, params),
+            MaterialDesc::ShadowCatcher(desc) => desc.compile(cx),
         }
     }
 }
@@ -92,6 +97,8 @@ pub enum Reflection {
     MetallicRoughness(MetallicRoughness),
     /// `unlit`: the radiance.
     Unlit(Param<Rgb>),
+    /// `shadow-catcher`.
+    ShadowCatcher(ShadowCatcher),
 }
 
 impl Material {
@@ -138,7 +145,7 @@ impl Material {
     fn coat(&self) -> Option<&Clearcoat> {
         match &self.reflection {
             Reflection::MetallicRoughness(material) => material.coat.as_ref(),
-            Reflection::Classic(_) | Reflection::Unlit(_) => None,
+            Reflection::Classic(_) | Reflection::Unlit(_) | Reflection::ShadowCatcher(_) => None,
         }
     }
 
@@ -162,6 +169,7 @@ impl Material {
             Reflection::Classic(classic) => classic.evaluate(color, number, ambient, slope_variance),
             Reflection::MetallicRoughness(material) => material.evaluate(color, number, ambient, slope_variance),
             Reflection::Unlit(_) => unlit::UNLIT,
+            Reflection::ShadowCatcher(catcher) => catcher.bsdf(),
         }
     }
 
@@ -201,6 +209,7 @@ impl Material {
             Reflection::MetallicRoughness(material) => material.ignores(slope_variance),
             // Filtered under maps only
             Reflection::Classic(_) | Reflection::Unlit(_) => self.common.normals.is_none(),
+            Reflection::ShadowCatcher(_) => true,
         }
     }
 
@@ -209,7 +218,7 @@ impl Material {
         match &self.reflection {
             Reflection::Classic(classic) => classic.shininess.texture.is_some(),
             Reflection::MetallicRoughness(material) => material.roughness.texture.is_some(),
-            Reflection::Unlit(_) => false,
+            Reflection::Unlit(_) | Reflection::ShadowCatcher(_) => false,
         }
     }
 
@@ -219,6 +228,7 @@ impl Material {
             Reflection::Classic(classic) => classic.textures()[..3].iter().any(Option::is_some),
             Reflection::MetallicRoughness(material) => material.textures()[..2].iter().any(Option::is_some),
             Reflection::Unlit(_) => true,
+            Reflection::ShadowCatcher(_) => false,
         };
         let is_lobe = self.has_lobe_texture() || self.refines_normals();
         is_lobe && !has_colors && self.is_one_bsdf() && !self.is_mapped()
@@ -229,7 +239,7 @@ impl Material {
         match &self.reflection {
             Reflection::Classic(classic) => classic.shininess.texture.is_some(),
             Reflection::MetallicRoughness(material) => material.textures()[2..].iter().any(Option::is_some),
-            Reflection::Unlit(_) => false,
+            Reflection::Unlit(_) | Reflection::ShadowCatcher(_) => false,
         }
     }
 
@@ -238,7 +248,7 @@ impl Material {
         match &self.reflection {
             Reflection::Classic(classic) => !classic.specular.factor.is_black(),
             Reflection::MetallicRoughness(_) => true,
-            Reflection::Unlit(_) => false,
+            Reflection::Unlit(_) | Reflection::ShadowCatcher(_) => false,
         }
     }
 
@@ -262,7 +272,7 @@ impl Material {
         match &self.reflection {
             Reflection::Classic(_) => !ambient.is_uniform(),
             Reflection::MetallicRoughness(_) => !ambient.is_black(),
-            Reflection::Unlit(_) => false,
+            Reflection::Unlit(_) | Reflection::ShadowCatcher(_) => false,
         }
     }
 
@@ -272,6 +282,7 @@ impl Material {
             Reflection::Classic(classic) => &classic.diffuse,
             Reflection::MetallicRoughness(material) => &material.base_color,
             Reflection::Unlit(radiance) => radiance,
+            Reflection::ShadowCatcher(_) => return Rgb::BLACK,
         };
         color.color(si, textures) * si.color
     }
@@ -284,7 +295,7 @@ impl Material {
             Reflection::MetallicRoughness(material) => {
                 material.roughness.number(si, textures, si.footprints_per_pixel).clamp(0.0, 1.0)
             }
-            Reflection::Unlit(_) => 1.0,
+            Reflection::Unlit(_) | Reflection::ShadowCatcher(_) => 1.0,
         }
     }
 
@@ -294,7 +305,7 @@ impl Material {
             Reflection::MetallicRoughness(material) => {
                 material.metallic.number(si, textures, si.footprints_per_pixel).clamp(0.0, 1.0)
             }
-            Reflection::Classic(_) | Reflection::Unlit(_) => 0.0,
+            Reflection::Classic(_) | Reflection::Unlit(_) | Reflection::ShadowCatcher(_) => 0.0,
         }
     }
 
@@ -305,6 +316,7 @@ impl Material {
             Reflection::Classic(classic) => all.extend(classic.textures()),
             Reflection::MetallicRoughness(material) => all.extend(material.textures()),
             Reflection::Unlit(radiance) => all.push(radiance.texture),
+            Reflection::ShadowCatcher(_) => {}
         }
         all.extend(self.coat().into_iter().flat_map(Clearcoat::textures));
         all.into_iter()
@@ -324,6 +336,7 @@ impl Material {
             Reflection::Classic(classic) => classic.contrast(contrast),
             Reflection::MetallicRoughness(material) => material.contrast(contrast),
             Reflection::Unlit(_) => None,
+            Reflection::ShadowCatcher(_) => Some((Colors::BLACK, Rgb::BLACK)),
         }
     }
 

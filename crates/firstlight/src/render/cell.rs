@@ -21,6 +21,7 @@ mod primary;
 
 use std::iter;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use super::Counts;
 use super::direct::{DirectLighting, LightEstimate, LightQuery};
@@ -32,6 +33,7 @@ use super::square::Square;
 use super::visible_shape::{MeanBsdf, VisibleShape};
 use crate::color::Rgb;
 use crate::film::FilmTile;
+use crate::film::catchers::ChosenPixels;
 use crate::film::hits::{PixelHits, PixelRays};
 use crate::film::resolve::{PixelTerms, ScaledTerm, Term, TermSums};
 use crate::film::tile::Tile;
@@ -94,6 +96,8 @@ pub(crate) struct CellRenderer<'a> {
     mode: AaMode,
     lights: DirectLighting<'a>,
     corner: [u32; 2],
+    /// The pixels that are asked for; `None`: all.
+    chosen: Option<Arc<ChosenPixels>>,
     /// Pixel by pixel of the cell.
     states: Vec<PixelState>,
     sums: TermSums,
@@ -131,6 +135,7 @@ impl<'a> CellRenderer<'a> {
             mode,
             lights,
             corner: [0; 2],
+            chosen: None,
             states: vec![PixelState::Done; PIXELS],
             sums: TermSums::new(scene, PIXELS, buffers),
             blocks: Vec::new(),
@@ -155,6 +160,7 @@ impl<'a> CellRenderer<'a> {
     /// Renders one tile. It calls `go_on` between the stations of a cell, and stops where that breaks.
     pub fn render(&mut self, film: &mut FilmTile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<(), Counts> {
         let mut counts = Counts::default();
+        self.chosen = film.chosen.clone();
         for part in film.tile.parts(CELL, CELL) {
             go_on()?;
             self.cell([part.x, part.y].map(|at| at / CELL * CELL), &mut counts, go_on)?;
@@ -166,6 +172,9 @@ impl<'a> CellRenderer<'a> {
     /// Renders a cell.
     fn cell(&mut self, corner: [u32; 2], counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
         self.begin(corner);
+        if let Some(stop) = self.chosen.as_ref().and_then(|chosen| chosen.stop(corner, CELL)) {
+            self.lights.judge_at(stop);
+        }
         self.primary(Square { x: corner[0], y: corner[1], side: CELL }, &VisibleShape::all(self.scene), counts);
         go_on()?;
         if let Some(mut many) = self.many.take() {

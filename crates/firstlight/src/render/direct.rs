@@ -12,7 +12,7 @@ use std::ops::ControlFlow;
 
 use fearless_simd::Level;
 
-use super::lights::Lights;
+use super::lights::{JudgedSteps, Lights};
 use super::pooled::LightSampler;
 use super::{Counts, QUESTION_EVERY};
 use crate::color::{DisplaySteps, Rgb};
@@ -121,6 +121,8 @@ pub(crate) struct DirectLighting<'a> {
     pub(super) lights: &'a Lights<'a>,
     pub(super) level: Level,
     pub(super) evaluator: AreaLightIntegrator,
+    /// By which errors are weighed.
+    steps: &'a JudgedSteps,
     /// In display steps: the allowed error of one light at a point.
     allowed: f32,
     /// The numbers of queries, by kind of lobe, light, and whether occluders count.
@@ -143,6 +145,7 @@ impl<'a> DirectLighting<'a> {
             lights,
             level,
             evaluator: AreaLightIntegrator::default(),
+            steps: &lights.steps,
             allowed: lights.allowed,
             order: Vec::new(),
             points: Vec::new(),
@@ -167,7 +170,12 @@ impl<'a> DirectLighting<'a> {
 
     /// The display curve, by which errors are weighed.
     pub fn display_steps(&self) -> &'a DisplaySteps {
-        &self.lights.steps
+        &self.steps.curve
+    }
+
+    /// Weighs errors of light as if it was raised by so many stops, in place of the exposure of the scene.
+    pub fn judge_at(&mut self, stop: i32) {
+        self.steps = self.lights.steps_at(stop);
     }
 
     /// Sets the allowed error of each light, in display steps.
@@ -177,7 +185,7 @@ impl<'a> DirectLighting<'a> {
 
     /// The display steps between a value and the same value less an error.
     pub fn steps(&self, value: Rgb, error: Rgb) -> f32 {
-        self.lights.steps.of_color(value, error)
+        self.steps.curve.of_color(value, error)
     }
 
     /// The factor of the moments of light `index`, before the colours of the surface.
@@ -401,7 +409,9 @@ impl<'a> DirectLighting<'a> {
         self.points.extend(members.iter().map(|k| *of.point(*k)));
         self.integrals.clear();
         let shadows = visibility != Visibility::Full;
-        let Some(task) = self.lights.task(of.light, of.lobe, shadows) else { unreachable!("it has an area") };
+        let Some(task) = self.lights.task(of.light, of.lobe, shadows, self.steps) else {
+            unreachable!("it has an area")
+        };
         let task = LightTask { sums, allowed: self.allowed, ..task };
         self.evaluator.evaluate(self.level, &task, &self.points, &mut self.integrals);
     }

@@ -30,12 +30,13 @@ mod visible_shape;
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 
 pub use counts::{LightCounts, RenderStats};
 
 use crate::accel::SimdLevel;
+use crate::film::catchers::{self, ChosenPixels, Shadows};
 use crate::film::coverage::{Coverage, CoveragePlanes};
 use crate::film::hits::PixelHits;
 use crate::film::passes::Passes;
@@ -43,7 +44,7 @@ use crate::film::resolve::TermSums;
 use crate::film::settings::Renderer;
 use crate::film::tile::{self, Tile};
 use crate::film::{AaMode, Film, FilmTile, RenderSettings, centers};
-use crate::image::{Buffer, Image};
+use crate::image::{Buffer, Image, Plane, Window};
 use crate::math::Ray;
 use crate::parallel;
 use crate::scene::Scene;
@@ -73,38 +74,67 @@ pub fn render(
     if let Err(fault) = settings.check(scene) {
         panic!("{fault}");
     }
+    let window = settings.window(scene);
     let passes = Passes::of(scene, &settings.buffers);
-    if passes.unshadowed.is_empty() && passes.picture == settings.buffers {
-        return expose(scene, settings, &settings.buffers, progress);
+    let catchers = scene.catchers.as_ref().filter(|_| catchers::change_any(&passes.picture));
+    if passes.unshadowed.is_empty() && passes.picture == settings.buffers && catchers.is_none() {
+        return expose(scene, settings, (window, None), &settings.buffers, progress);
     }
     // A pixel is done when it is in every pass
-    let count = u64::from(!passes.picture.is_empty()) + u64::from(!passes.unshadowed.is_empty());
-    let mut before = 0;
-    let mut pass = |scene: &Scene, planes: &[Buffer]| {
+    let of_catchers = if catchers.is_some() { catchers::PASSES } else { 0 };
+    let count = u64::from(!passes.picture.is_empty()) + u64::from(!passes.unshadowed.is_empty()) + of_catchers;
+    let pixels = u64::from(window.width) * u64::from(window.height);
+    let (mut before, mut all_stats) = (0, None);
+    let mut pass = |scene: &Scene, part: (Window, Option<ChosenPixels>), planes: &[Buffer]| {
         if planes.is_empty() {
             return ControlFlow::Continue(None);
         }
-        let progress = |done, all| progress((before * all + done) / count, all);
-        let exposed = expose(scene, settings, planes, &progress)?;
+        let progress = |done, all| progress((before * pixels + done * pixels / all) / count, pixels);
+        let (film, stats) = expose(scene, settings, part, planes, &progress)?;
         before += 1;
-        ControlFlow::Continue(Some(exposed))
+        all_stats = Some(all_stats.map_or(stats, |all: RenderStats| all.and(&stats)));
+        ControlFlow::Continue(Some(film))
     };
-    let (picture, unshadowed) = (pass(scene, &passes.picture)?, pass(&scene.without_shadows(), &passes.unshadowed)?);
-    let stats = [&picture, &unshadowed].into_iter().flatten().map(|(_, stats)| *stats);
-    let stats = stats.reduce(|all, stats| all.and(&stats)).expect("there is a pass for every buffer");
-    let film = picture.map_or_else(|| Film::new(scene, settings.window(scene), &[]), |(film, _)| film);
-    let unshadowed = unshadowed.as_ref().map(|(film, _)| film);
-    ControlFlow::Continue((Passes::develop(scene, &settings.buffers, film, unshadowed), stats))
+    let picture = pass(scene, (window, None), &passes.picture)?;
+    let picture = picture.unwrap_or_else(|| Film::new(scene, window, &[]));
+    let mut shadows = None;
+    if let Some(catchers) = catchers {
+        let cells = catchers::whole_cells(scene, window, CELL);
+        let is_integrated =
+            !settings.renderer().samples_all() && scene.lights.iter().any(|light| light.is_integrated());
+        let heat = passes.picture.contains(&Plane::Rays.into());
+        let kinds = [is_integrated, heat];
+        let found = Shadows::find(scene, catchers, (cells, CELL), kinds, |scene, planes, chosen| {
+            let film = pass(scene, (cells, chosen), planes)?;
+            ControlFlow::Continue(film.expect("it has planes"))
+        })?;
+        let mut changed = catchers::changed(&passes.picture);
+        changed.extend(heat.then_some(Buffer::from(Plane::Rays)));
+        let black = match found.mixed() {
+            Some(mixed) => pass(&scene.with_black_catchers(catchers), (cells, Some(mixed)), &changed)?,
+            None => None,
+        };
+        shadows = Some((found, black));
+    }
+    let unshadowed = pass(&scene.without_shadows(), (window, None), &passes.unshadowed)?;
+    let stats = all_stats.expect("there is a pass for every buffer");
+    let cover = |picture: &mut Film| {
+        if let Some((shadows, black)) = shadows {
+            shadows.cover(picture, black.as_ref());
+        }
+    };
+    ControlFlow::Continue((Passes::develop(scene, &settings.buffers, picture, unshadowed.as_ref(), cover), stats))
 }
 
-/// Renders some planes in one pass.
+/// Renders some planes of a window, or of some pixels of it, in one pass.
 fn expose(
     scene: &Scene,
     settings: &RenderSettings,
+    (window, chosen): (Window, Option<ChosenPixels>),
     planes: &[Buffer],
     progress: &(dyn Fn(u64, u64) -> ControlFlow<()> + Sync),
 ) -> ControlFlow<(), (Film, RenderStats)> {
-    let window = settings.window(scene);
+    let chosen = chosen.map(Arc::new);
     let threads = settings.threads.map_or_else(available_threads, NonZeroUsize::get);
     let renderer = settings.renderer_of(scene);
     let level = settings.simd.resolve();
@@ -136,7 +166,7 @@ fn expose(
             }
             if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let mut film_tile = FilmTile::new(*tile, planes);
+        let mut film_tile = FilmTile::new(*tile, planes, chosen.clone());
         let film = &mut film_tile;
         let token = level.token();
         let center_rays = if of_centers { centers::fill(scene, token, film) } else { 0 };
@@ -146,7 +176,7 @@ fn expose(
             return;
         }
         let rendered = match renderer {
-            _ if !is_lit => ControlFlow::Continue(Counts::default()),
+            _ if !is_lit || !film.asks_any() => ControlFlow::Continue(Counts::default()),
             Renderer::Reference => render_tile(scene, film, &mut Plain, None, &go_on),
             Renderer::Traced => {
                 let hits = scene.geometry.has_trees().then(|| PixelHits::new(token, scene.antialiasing));
@@ -225,6 +255,9 @@ fn render_tile(
             hits.trace(scene, block);
         }
         for at in block.pixels() {
+            if !film.asks(at) {
+                continue;
+            }
             let hit = |column: u32, row: u32, ray: &Ray| match &hits {
                 Some(hits) => hits.get(at, column, row),
                 None => scene.intersect_local(ray),

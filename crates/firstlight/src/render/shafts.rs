@@ -57,6 +57,9 @@ impl<'a> Shafts<'a> {
         let mut pixels: Vec<(PixelSum, usize)> = (0..side * side).map(|_| (PixelSum::new(self.scene), 0)).collect();
         let mut sums = TermSums::new(self.scene, 1, &film.planes());
         for block in film.tile.parts(side, 1) {
+            if !block.pixels().any(|at| film.asks(at)) {
+                continue;
+            }
             let pixels = &mut pixels[..(block.width * block.height) as usize];
             let before = counts.work();
             self.block(block, pixels, &mut counts, go_on)?;

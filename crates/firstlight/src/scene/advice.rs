@@ -31,11 +31,23 @@ pub(super) fn advise(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc) {
     }
     advise_light(cx, scene);
     advise_emission(cx, scene, desc);
-    if !search.met && (scene.geometry.bounds().is_some() || !scene.geometry.unbounded.is_empty()) {
+    advise_catchers(cx, scene);
+    if !search.met
+        && scene.catchers.is_none()
+        && (scene.geometry.bounds().is_some() || !scene.geometry.unbounded.is_empty())
+    {
         advise_view(cx, scene, desc, &search);
     }
     advise_directions(cx, scene);
     advise_digits(cx, scene);
+}
+
+/// Advises if shadows on catchers darken what is black.
+fn advise_catchers(cx: &mut CompileContext, scene: &Scene) {
+    if scene.catchers.is_some() && !scene.transparent && scene.background.is_black() {
+        let message = "shadow catchers darken what is behind them, and the background is black";
+        cx.advise("render.background", message, Some("with transparent = true the shadow is the picture's alpha"));
+    }
 }
 
 /// Places are known well enough if they are known to this part of a pixel.

@@ -24,7 +24,7 @@ use crate::describe::{Family, SamplesDesc};
 use crate::error::{Diagnostic, SceneError, Severity};
 use crate::import::WithContained;
 use crate::light::{Light, LightDesc, check_samples};
-use crate::material::{Ambient, Material};
+use crate::material::{Ambient, Material, MaterialDesc};
 use crate::math::DVec3;
 use crate::shape::{CompileCache, MeshFiles, ShapeDesc};
 use crate::transform::MAX_TIME;
@@ -103,8 +103,10 @@ impl SceneDesc {
         options: &CompileOptions,
     ) -> Option<(Scene, Added)> {
         let time = options.time;
-        // What is compiled for two moments shares what does not move
-        let is_twice = self.render.motion_to.is_some() || options.studio.is_some();
+        // What is compiled for two moments, or for two kinds of camera rays, shares what is the same
+        let has_catchers =
+            self.materials.iter().any(|(_, material)| matches!(material, MaterialDesc::ShadowCatcher(_)));
+        let is_twice = self.render.motion_to.is_some() || options.studio.is_some() || has_catchers;
         let shared = is_twice.then(CompileCache::default);
         let cache = options.cache.as_ref().or(shared.as_ref());
         if let Some(cache) = cache {
@@ -138,17 +140,17 @@ impl SceneDesc {
         let materials = self.compile_materials(cx, &mut textures);
         let textures = textures.finish(cx);
         cx.take("texture", "textures", textures.bytes);
-        let geometry = compile_shapes(self, &materials, cx, assets, &mut files);
+        let geometry = compile_shapes(self, &materials, false, cx, assets, &mut files);
         let origin = cx.origin;
         let bounds = geometry.as_ref().and_then(Geometry::bounds).map(|bounds| bounds.map(|corner| corner + origin));
         let added = self.complete(cx, assets, options, &materials, geometry.as_ref(), (source, &files));
         // A ground changes what rays meet; all else is kept from before
+        let mut shapes = Cow::Borrowed(self);
         let geometry = match &added.ground {
             Some(ground) => {
-                let mut shapes = self.clone();
-                shapes.shapes.push(ground.clone());
+                shapes.to_mut().shapes.push(ground.clone());
                 files.read.clear();
-                compile_shapes(&shapes, &materials, cx, assets, &mut files)
+                compile_shapes(&shapes, &materials, false, cx, assets, &mut files)
             }
             None => geometry,
         };
@@ -198,11 +200,14 @@ impl SceneDesc {
             moment: time,
             time: cx.keyed.then_some(time),
             motion: None,
+            catchers: None,
+            leaves_out_black: false,
             placeholders: textures.placeholders,
             textures: textures.compiled,
             summary,
         };
-        scene.motion = self.compile_motion(cx, assets, (source, &files), desc, &scene);
+        scene.catchers = shapes.compile_catchers(cx, assets, &files, &scene);
+        scene.motion = self.compile_motion(cx, assets, (source, &files), (desc, added.ground.as_ref()), &scene);
         advise(cx, &scene, desc);
         Some((scene, added))
     }
@@ -233,7 +238,7 @@ impl SceneDesc {
             let mut at_zero = CompileContext::at_time(0.0);
             let files = &mut files.again();
             let said = source.with_models(&mut at_zero, assets, files);
-            compile_shapes(&said, materials, &mut at_zero, assets, files).map(|still| (still, at_zero.origin))
+            compile_shapes(&said, materials, false, &mut at_zero, assets, files).map(|still| (still, at_zero.origin))
         } else {
             None
         };

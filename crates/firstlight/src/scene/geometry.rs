@@ -112,6 +112,8 @@ pub(crate) struct MaterialRules {
     layered: Vec<bool>,
     /// For each material whether camera rays pass through from behind; empty if they do through none.
     single_sided: Vec<bool>,
+    /// For each material whether camera rays pass through from both sides; empty if they do through none.
+    unseen: Vec<bool>,
     /// For each material whether it bends shading normals; empty if none does.
     mapped: Vec<bool>,
     /// For each material whether its shading normals are bent, raised, or filtered; empty if those of none are.
@@ -129,6 +131,7 @@ impl MaterialRules {
         MaterialRules {
             layered: each(|material| material.common.alpha.is_some()),
             single_sided: each(|material| material.common.single_sided),
+            unseen: each(Material::is_shadow_catcher),
             mapped: each(Material::is_mapped),
             refined: each(Material::refines_normals),
             uv_sets: match materials.iter().any(|material| material.uv_sets.all != 0) {
@@ -184,6 +187,16 @@ impl MaterialRules {
     /// Whether surfaces of a material are layers.
     pub fn is_layered(&self, material: MaterialId) -> bool {
         self.layered.get(material.index()).is_some_and(|is| *is)
+    }
+
+    /// The same, by which camera rays see shadow catchers.
+    pub fn with_catchers(self) -> MaterialRules {
+        MaterialRules { unseen: Vec::new(), ..self }
+    }
+
+    /// Whether camera rays pass through surfaces of a material from both sides: through shadow catchers.
+    pub fn is_unseen(&self, material: MaterialId) -> bool {
+        self.unseen.get(material.index()).is_some_and(|is| *is)
     }
 
     /// Whether camera rays pass from behind through surfaces of a material.

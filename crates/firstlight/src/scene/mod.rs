@@ -4,6 +4,7 @@ mod advice;
 mod buffers;
 mod builtin;
 mod cast;
+mod catchers;
 mod compile;
 mod course;
 mod description;
@@ -37,6 +38,7 @@ mod world;
 
 pub use builtin::{Builtin, builtin_scenes};
 pub use cast::CastHit;
+pub(crate) use catchers::Catchers;
 pub use compile::{CompileOptions, Compiled};
 pub(crate) use compile::{MAX_ANTIALIASING, MAX_SIDE};
 pub use description::{DisplayEncoding, RenderDesc, SceneDesc};
@@ -120,6 +122,10 @@ pub struct Scene {
     pub(crate) time: Option<f64>,
     /// Whereto `motion` leads.
     pub(crate) motion: Option<Arc<Motion>>,
+    /// What rays can meet where camera rays end at shadow catchers; `None` without any.
+    pub(crate) catchers: Option<Arc<Catchers>>,
+    /// Whether surfaces that reflect nothing are left out of all decisions on how light is found.
+    pub(crate) leaves_out_black: bool,
     /// The texture files that something stands in for.
     pub(crate) placeholders: Vec<String>,
     pub(crate) summary: SceneSummary,

@@ -19,7 +19,7 @@ use crate::error::{SceneError, Severity};
 use crate::ids::SurfaceId;
 use crate::light::LightDesc;
 use crate::math::{DAffine3, DVec3};
-use crate::shape::MeshFiles;
+use crate::shape::{MeshFiles, ShapeDesc};
 use crate::transform::{MAX_TIME, TransformDesc};
 
 /// Whereto `motion` leads from the picture: to another moment of the same camera, or to another camera at the same
@@ -140,7 +140,7 @@ impl SceneDesc {
         cx: &mut CompileContext,
         assets: &dyn Assets,
         (source, files): (&SceneDesc, &MeshFiles<'_>),
-        completed: &SceneDesc,
+        (completed, ground): (&SceneDesc, Option<&ShapeDesc>),
         here: &Scene,
     ) -> Option<Arc<Motion>> {
         let (to, path) = (self.render.motion_to.clone()?, "render.motion_to");
@@ -171,8 +171,11 @@ impl SceneDesc {
             let at = &mut CompileContext::at_time(time);
             at.progress = cx.progress.clone();
             let files = &mut files.again();
-            let said = source.with_models(at, assets, files);
-            let geometry = compile_shapes(&said, &here.materials, at, assets, files);
+            let mut said = source.with_models(at, assets, files);
+            if let Some(ground) = ground {
+                said.to_mut().shapes.push(ground.clone());
+            }
+            let geometry = compile_shapes(&said, &here.materials, false, at, assets, files);
             there.origin = at.origin;
             there.camera = completed.compile_camera(at, here.width, here.height, geometry.is_some());
             there.lights = completed.compile_lights(at);

@@ -171,10 +171,11 @@ impl Extents<'_> {
     }
 }
 
-/// Compiles all shapes of a scene. `None` after an error.
+/// Compiles all shapes of a scene; camera rays end at shadow catchers if they are `caught`. `None` after an error.
 pub(super) fn compile_shapes(
     desc: &SceneDesc,
     compiled: &[Material],
+    caught: bool,
     cx: &mut CompileContext,
     assets: &dyn Assets,
     files: &mut MeshFiles<'_>,
@@ -185,6 +186,7 @@ pub(super) fn compile_shapes(
     // The first of a name; a second one is a fault of the text
     let group_ids = desc.groups.iter().enumerate().rev().map(|(id, (name, _))| (name.as_str(), id)).collect();
     let rules = MaterialRules::new(compiled);
+    let rules = if caught { rules.with_catchers() } else { rules };
     let shapes = desc.groups.iter().flat_map(|(_, group)| &group.shapes).chain(&desc.shapes);
     let may_matter = rules.has_maps() || rules.has_uv_sets();
     let instances = shapes.filter(|shape| may_matter && matches!(shape, ShapeDesc::Instance(_)));
@@ -291,7 +293,7 @@ struct Compiler<'a, 'c> {
     /// The sets of texture coordinates that materials of instances name.
     uv_sets_of_instances: UvSetUse,
     /// Numbers for what surfaces say of rays.
-    classes: HashMap<(RayRules, bool), u32>,
+    classes: HashMap<(RayRules, [bool; 2]), u32>,
 }
 
 impl Compiler<'_, '_> {
@@ -394,8 +396,13 @@ impl Compiler<'_, '_> {
     /// A number for what a surface says of rays: of shapes at the same place, those of one number are the same to them.
     fn class(&mut self, surface: &Surface) -> u32 {
         let next = self.classes.len() as u32;
-        let single_sided = surface.material.is_some_and(|material| self.rules.is_single_sided(material));
-        *self.classes.entry((surface.ray_rules(), single_sided)).or_insert(next)
+        let passes = surface.material.map_or([false; 2], |material| self.passes(material));
+        *self.classes.entry((surface.ray_rules(), passes)).or_insert(next)
+    }
+
+    /// Whether camera rays pass through surfaces of a material from behind, and from both sides.
+    fn passes(&self, material: MaterialId) -> [bool; 2] {
+        [self.rules.is_single_sided(material), self.rules.is_unseen(material)]
     }
 
     /// Adds a mesh of such a number and class to those that are opaque, or to those that are not; where its faces
@@ -418,8 +425,7 @@ impl Compiler<'_, '_> {
             meshes.iter_mut().for_each(|mesh| mesh.has_tangents = true);
         }
         let layered: Vec<bool> = faces.iter().map(|material| self.rules.is_layered(*material)).collect();
-        let sided = |material: &MaterialId| self.rules.is_single_sided(*material);
-        if faces.iter().any(|material| sided(material) != sided(&faces[0])) {
+        if faces.iter().any(|material| self.passes(*material) != self.passes(faces[0])) {
             meshes[0].keeps_copies = true;
         }
         if layered.iter().all(|is| *is == layered[0]) {

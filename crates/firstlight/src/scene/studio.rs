@@ -9,7 +9,7 @@ use crate::describe::node::{ReadText, Syntax};
 use crate::describe::read::{Faults, Reader};
 use crate::describe::{ColorDesc, FilePath, NameMap, Table, TextValue, node, table, words};
 use crate::light::{DirectionalDesc, LightDesc, RectangleDesc};
-use crate::material::{AmbientDesc, AmbientGradientDesc, MaterialDesc};
+use crate::material::{AmbientDesc, AmbientGradientDesc, MaterialDesc, ShadowCatcherDesc};
 use crate::math::DVec3;
 use crate::model::clay;
 use crate::shape::{ModelDesc, ParallelogramDesc, ShapeDesc, UpAxis};
@@ -93,6 +93,8 @@ const RIM: Lamp = Lamp { name: "rim", azimuth_deg: 160.0, elevation_deg: 42.0, s
 const AMBIENT: [f64; 2] = [0.42, 0.2];
 /// What is behind models.
 const BACKGROUND: f64 = 0.78;
+/// How dark the ground is where no light of the studio arrives: 0 to 1.
+const GROUND_ALPHA: f64 = 0.7;
 /// Half of a side of the ground, in radii.
 const GROUND_REACH: f64 = 14.0;
 /// In display steps: larger than that of scenes, since nothing is compared with these pictures.
@@ -208,5 +210,5 @@ impl SceneDesc {
 
 /// The material of the ground.
 fn ground_material() -> MaterialDesc {
-    clay(false)
+    MaterialDesc::ShadowCatcher(ShadowCatcherDesc { alpha: GROUND_ALPHA, ..ShadowCatcherDesc::default() })
 }

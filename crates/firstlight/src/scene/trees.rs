@@ -353,8 +353,10 @@ impl Geometry {
     pub(super) fn seen(&self, mesh: &Mesh, first: u32, triangle: u32, d: Vec3) -> bool {
         let part = mesh.part(triangle);
         let surface = &self.surfaces[(first + part.surface) as usize];
-        let of_face = || surface.material.is_none() && self.rules.is_single_sided(part.material(triangle));
-        surface.visible && !((surface.single_sided || of_face()) && mesh.is_behind(triangle, d))
+        let face = surface.material.is_none().then(|| part.material(triangle));
+        let of_face = || face.is_some_and(|material| self.rules.is_single_sided(material));
+        let is_visible = surface.visible && !face.is_some_and(|material| self.rules.is_unseen(material));
+        is_visible && !((surface.single_sided || of_face()) && mesh.is_behind(triangle, d))
     }
 
     /// The first triangle on a ray, in the mesh's space. Not inlined: one copy for each instruction set is enough.

@@ -34,6 +34,9 @@ type Seen = Option<(Option<VisibleShape>, Hit)>;
 impl CellRenderer<'_> {
     /// Finds the surfaces that the pixels of a square see. `candidates` are all shapes that a square around it may see.
     pub(super) fn primary(&mut self, square: Square, candidates: &[VisibleShape], counts: &mut Counts) {
+        if self.chosen.as_ref().is_some_and(|chosen| !chosen.has_any(square.pixels())) {
+            return;
+        }
         let scene = self.scene;
         let frustum = TileFrustum::new(scene, square);
         let near = frustum.candidates(scene, candidates);
@@ -77,6 +80,9 @@ impl CellRenderer<'_> {
         for block in (Tile { x, y, width, height }).parts(step, 1) {
             self.hits.trace(scene, block);
             for at in block.pixels() {
+                if self.chosen.as_ref().is_some_and(|chosen| !chosen.has(at)) {
+                    continue;
+                }
                 let seen = |cells: &Self, [x, y]: [u16; 2], _: &Ray| {
                     let hit = cells.hits.get(at, x.into(), y.into())?;
                     Some((VisibleShape::of(scene, &hit), hit))
@@ -180,6 +186,9 @@ impl CellRenderer<'_> {
             points.push(RayPoint { shape, point, at, is_layered });
             points.extend(further.into_iter().map(|point| RayPoint { shape, point, at, is_layered }));
         }
+        if scene.leaves_out_black {
+            points.retain(|ray| !ray.point.bsdf.is_black());
+        }
         let number = self.pixels.len() as u32;
         self.pixels.push(pixel);
         self.fragments.add(scene, number, [i, j], &mut points, self.mode == AaMode::Adaptive);
@@ -190,6 +199,13 @@ impl CellRenderer<'_> {
     fn add_blocks(&mut self, square: Square, shape: VisibleShape) {
         let scene = self.scene;
         if let Some(bsdf) = self.fragments.plain_bsdf(scene, shape).or_else(|| shape.constant_bsdf(scene, square)) {
+            if scene.leaves_out_black && bsdf.is_black() {
+                for at in self.on_film(square) {
+                    let index = self.index(at);
+                    PixelTerms::default().resolve(scene, iter::empty(), index, &mut self.sums);
+                }
+                return;
+            }
             self.mark(square, PixelState::Block(self.blocks.len() as u32));
             self.blocks.push(SurfaceBlock { square, shape, bsdf, layer: 0, means: None });
             return;

@@ -108,6 +108,7 @@ impl SceneWalk<'_> {
         self.parts.surfaces.extend(surfaces.map(|leaf| {
             let mut surface = over.surface(&leaf.surface, links);
             surface.single_sided |= surface.material.is_some_and(|material| rules.is_single_sided(material));
+            surface.visible &= !surface.material.is_some_and(|material| rules.is_unseen(material));
             surface
         }));
         let own_space = self.parts.spaces.len() as u32;
@@ -120,7 +121,7 @@ impl SceneWalk<'_> {
             let layered =
                 own.and_then(|own| own.material).is_some_and(|material| self.parts.rules.is_layered(material));
             let single_sided = own.is_some_and(|own| own.single_sided);
-            let seen = over.visible && leaf.surface.visible && !layered;
+            let seen = own.is_some_and(|own| own.visible) && !layered;
             if !matches!(leaf.form, Form::Instance(_)) {
                 let space = if leaf.transform.is_some() { self.parts.spaces.len() as u32 } else { own_space };
                 if leaf.transform.is_some() {
@@ -205,7 +206,7 @@ pub(super) fn opacities(surfaces: &[Surface], rules: &MaterialRules, first: u32,
         (false, true) => Opacity::Mixed,
         (false, false) => Opacity::Clear,
     };
-    let passes = |material: &MaterialId| rules.is_single_sided(*material);
+    let passes = |material: &MaterialId| rules.is_single_sided(*material) || rules.is_unseen(*material);
     let faces_pass = mesh
         .parts
         .iter()
