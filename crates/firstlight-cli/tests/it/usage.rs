@@ -26,7 +26,7 @@ const BAD: &[(&str, &[&str])] = &[
     ("render scene.toml --background 0,0,0 --transparent", &["--background", "--transparent", "cannot be used with"]),
     ("render scene.toml --view front", &["--view", "scene.toml has one", "without a camera"]),
     ("render scene.toml --margin 0.1", &["--margin", "scene.toml has one"]),
-    ("render scene.toml --view above", &["above", "front, back, left, right, side, top, bottom, iso", "AZIMUTH,ELEVATION"]),
+    ("render scene.toml --view above", &["above", "right, side, top, bottom, iso", "AZIMUTH,ELEVATION"]),
     ("render scene.toml --margin 0.6", &["--margin", "0 to 0.45"]),
     ("render scene.toml --print-scene -o a.png", &["--print-scene", "cannot be used with"]),
     ("render scene.toml --print-scene --threads 2", &["--print-scene", "cannot be used with"]),
