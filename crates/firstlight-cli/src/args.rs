@@ -395,8 +395,8 @@ pub struct RenderArgs {
     pub frames: Option<Frames>,
 
     /// Renders every N-th of the pictures only, from the I-th on, for job arrays: of all frames, views and sizes of all
-    /// scenes, in their order. All of 1/N to N/N write what one run without it does, under the same names; where there are fewer than N
-    /// pictures, some have nothing to do, which is no error [default: 1/1]
+    /// scenes, in their order. All of 1/N to N/N write what one run without it does, under the same names; where there
+    /// are fewer than N pictures, some have nothing to do, which is no error [default: 1/1]
     #[arg(long, value_name = "I/N", value_parser = shard, help_heading = "Output")]
     pub shard: Option<Shard>,
 
@@ -439,14 +439,14 @@ pub struct RenderArgs {
     #[arg(long, value_name = "LEVEL", value_parser = SimdParser, help_heading = "Work")]
     pub simd: Option<SimdLevel>,
 
-    /// Ends a picture that is not done after so many seconds, 0.001 to 1e9, with an error, and writes nothing of it: with
-    /// its scene where that is read for it. A file that is being read and a tree that is being built are not stopped in
-    /// the middle [default: no limit]
+    /// Ends a picture that is not done after so many seconds, 0.001 to 1e9, with an error, and writes nothing of it:
+    /// with its scene where that is read for it. A file that is being read and a tree that is being built are not
+    /// stopped in the middle [default: no limit]
     #[arg(long = "max-time", value_name = "SECONDS", value_parser = limit_of_time, help_heading = "Work")]
     pub max_time: Option<f64>,
     /// Refuses a scene that takes more than so many mebibytes of memory, 1 to 16777216, before they are taken: by the
-    /// sizes of its files, its triangles and points, its textures, and the pixels and buffers of the picture. The program
-    /// itself takes some 20 of its own [default: no limit]
+    /// sizes of its files, its triangles and points, its textures, and the pixels and buffers of the picture. The
+    /// program itself takes some 20 of its own [default: no limit]
     #[arg(long = "max-memory", value_name = "MIB", value_parser = whole::<u32>(1, 1 << 24), help_heading = "Work")]
     pub max_memory: Option<u32>,
 

@@ -223,8 +223,8 @@ impl Target {
         matches!(self, Target::File(path) if path.to_str().is_some_and(|text| text.contains(word)))
     }
 
-    /// The folder that is to be made for it, if this has placeholders in the names of folders, and `filled` is this with
-    /// the names of a scene in place of them. What stands before the first of them has to be there.
+    /// The folder that is to be made for it, if this has placeholders in the names of folders, and `filled` is this
+    /// with the names of a scene in place of them. What stands before the first of them has to be there.
     pub fn folder_to_make(&self, filled: &Target) -> Option<PathBuf> {
         let (Target::File(path), Target::File(filled)) = (self, filled) else { return None };
         let folder = path.parent()?;

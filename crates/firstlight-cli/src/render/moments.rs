@@ -222,8 +222,8 @@ impl Run<'_> {
         let Some(time) = self.plan.max_time.filter(|_| is_past(self.deadline)) else { return Ok(()) };
         let (name, seconds) = (&self.input.name, time.as_secs_f64());
         Err(Failure::Work(format!(
-            "{name}: --max-time {seconds}: the picture was not done after {seconds} s, and none was written; allow more, \
-             or render faster: fewer pixels (--size), fewer camera rays (--aa), a larger --tolerance"
+            "{name}: --max-time {seconds}: the picture was not done after {seconds} s, and none was written; allow \
+             more, or render faster: fewer pixels (--size), fewer camera rays (--aa), a larger --tolerance"
         )))
     }
 

@@ -1,18 +1,19 @@
 //! `--summary`: the log of a run, a line of JSON for each picture.
 //!
 //! Unlike pictures it is not whole or absent: it is there from the beginning, and each line is written as a whole when
-//! its picture is done or has failed. So it can be read while the run goes on, and a run that was interrupted leaves what
-//! it had got to.
+//! its picture is done or has failed. So it can be read while the run goes on, and a run that was interrupted leaves
+//! what it had got to.
 
 use std::fs::File;
 use std::io::{self, Write};
+use std::path::Path;
 use std::time::Instant;
 
 use firstlight::PendingFile;
 use serde_json::json;
 
 use crate::output::{JsonFile, Output, Target};
-use crate::report::{Failure, say};
+use crate::report::{Failure, say, shown};
 
 /// The log of a run.
 pub(super) struct Summary {
@@ -22,6 +23,17 @@ pub(super) struct Summary {
     fault: Option<String>,
     /// The picture that is being made.
     now: Option<Entry>,
+}
+
+/// Sees that a link leads to no file of another kind, which would be replaced: a picture that a scene reads, for one.
+fn refuse_link(path: &Path) -> Result<(), Failure> {
+    let Ok(real) = path.canonicalize() else { return Ok(()) };
+    let is_own = real.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("jsonl"));
+    if is_own || !real.is_file() {
+        return Ok(());
+    }
+    let (name, real) = (shown(path), shown(&real));
+    Err(Failure::Usage(format!("--summary {name} leads to {real}, which is no .jsonl file; name another")))
 }
 
 struct Entry {
@@ -42,6 +54,7 @@ impl Summary {
             Some(Target::Stdout) => Some(Box::new(io::stdout())),
             Some(Target::File(path)) => {
                 let fault = |why: String| Failure::Work(format!("--summary: {why}"));
+                refuse_link(path)?;
                 // What else has the old one, under another name, keeps it
                 PendingFile::new(path).and_then(|pending| pending.commit(b"")).map_err(|e| fault(e.to_string()))?;
                 let opened = File::options().append(true).open(path);

@@ -134,7 +134,8 @@ fn a_summary_has_a_line_for_each_picture() {
     folder.put("textured.toml", missing);
     folder
         .run(&format!(
-            "render set/chairs textured.toml empty -o out/{{stem}}.png -o out/{{stem}}.exr --summary out/log.jsonl {TINY}"
+            "render set/chairs textured.toml empty -o out/{{stem}}.png -o out/{{stem}}.exr \
+             --summary out/log.jsonl {TINY}"
         ))
         .exits(1);
     let log = lines(&folder.get("out/log.jsonl"));
@@ -178,6 +179,11 @@ fn what_the_old_summary_shares_with_another_name_is_kept() {
     folder.put("out/kept.txt", "kept");
     fs::hard_link(folder.path("out/kept.txt"), folder.path("out/log.jsonl")).unwrap();
     folder.run(&format!("render set/chairs/a.stl -o out/a.png --summary out/log.jsonl {TINY}")).done();
+    assert_eq!(folder.get("out/kept.txt"), b"kept");
+    // Nor is anything replaced that a link of such a name leads to
+    std::os::unix::fs::symlink("kept.txt", folder.path("out/link.jsonl")).unwrap();
+    let run = folder.run(&format!("render set/chairs/a.stl -o out/a.png --summary out/link.jsonl {TINY}")).exits(2);
+    run.says(&["out/link.jsonl leads to", "which is no .jsonl file"]);
     assert_eq!(folder.get("out/kept.txt"), b"kept");
     // A disk that is full ends no run, and is no success
     let run = folder.run(&format!("render set/chairs -o out/{{stem}}.png --summary /dev/full {TINY}"));

@@ -45,8 +45,8 @@ pub struct CompileOptions {
     /// Bytes that pictures may take as textures, with their smaller copies; [`TEXTURE_MEMORY`](crate::TEXTURE_MEMORY)
     /// where it is `None`.
     pub texture_memory: Option<u64>,
-    /// Bytes that files, meshes, point sets and textures may take together, as far as that is known before they are made;
-    /// any number of bytes where it is `None`.
+    /// Bytes that files, meshes, point sets and textures may take together, as far as that is known before they are
+    /// made; any number of bytes where it is `None`.
     pub memory: Option<u64>,
     /// In seconds, from -1e9 to 1e9: where the scene has keys, it is compiled as it is at this time.
     pub time: f64,

@@ -164,8 +164,8 @@ impl SceneDesc {
 
 impl Scene {
     /// The least [distance](Framing::distance) at which all of `count` views of a turntable, of which `framing.view` is
-    /// the first, hold what is seen within their margins: so that it keeps its size and its place while it turns. `None`
-    /// where there is nothing that has an end.
+    /// the first, hold what is seen within their margins: so that it keeps its size and its place while it turns.
+    /// `None` where there is nothing that has an end.
     pub fn turntable_distance(&self, framing: &Framing, count: u32) -> Option<f64> {
         let seen = ShapeOutline::new(&self.geometry, self.origin);
         let bounds = seen.bounds()?;

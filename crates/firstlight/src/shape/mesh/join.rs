@@ -15,8 +15,8 @@ use crate::shape::placement::Placement;
 use crate::shape::surface::UV_SETS;
 use crate::shape::triangles::{TriangleTree, can_be_hit};
 
-/// What a mesh takes while its tree is built: a position, a normal and texture coordinates; three indices, the tree, and
-/// what building it needs. Measured on a surface of 500,000 triangles, whose peak this meets within a tenth.
+/// What a mesh takes while its tree is built: a position, a normal and texture coordinates; three indices, the tree,
+/// and what building it needs. Measured on a surface of 500,000 triangles, whose peak this meets within a tenth.
 const VERTEX_BYTES: u64 = 32;
 const TRIANGLE_BYTES: u64 = 120;
 
