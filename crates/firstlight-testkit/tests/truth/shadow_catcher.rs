@@ -224,8 +224,8 @@ fn where_nothing_is_in_shadow_the_picture_is_that_without_catchers() {
                 let (with, without) = (of(CATCHER), of(NOT_THERE));
                 let pairs = with.as_flattened().iter().zip(without.as_flattened());
                 let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-                // Clusters of lights may be others with shadows and without
-                let allowed = if kind == "many" { 1e-3 } else { 0.0 };
+                // Integrated light with shadows and without is off by errors of its own, each within the tolerance
+                let allowed = if kind == "sampled" { 0.0 } else { 2.0 / 255.0 };
                 assert!(off <= allowed, "{kind}, {render}: {off}");
             }
         }
