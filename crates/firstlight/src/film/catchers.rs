@@ -42,9 +42,9 @@ const COVER: Buffer = Buffer::Plane(Plane::Ambient);
 const WORK: Buffer = Buffer::Plane(Plane::Rays);
 /// The most passes that they take beside that of the picture.
 pub(crate) const PASSES: u64 = 3;
-/// In steps of 1/255 for a tolerance of 1: alphas up to this are within the errors of integrated light, and count as
+/// In display steps for a tolerance of 1: alphas up to this are within the errors of integrated light, and count as
 /// none; up to twice as much they are taken down, so that nothing jumps.
-const UNSURE: f32 = 0.25;
+const UNSURE: f32 = 0.5;
 
 /// Whether catchers change a buffer: it is the colour, or a part of it.
 fn is_changed(buffer: Buffer) -> bool {
@@ -128,7 +128,8 @@ impl Shadows {
         let shadowed = ChosenPixels { window, chosen: chosen.clone(), stops };
         let shadowed = pass(&scene.with_lit_catchers(catchers), &planes(vec![LIGHT]), Some(shadowed))?;
         let arrives = of(floats(&shadowed, LIGHT), 0);
-        let unsure = if is_integrated { UNSURE * scene.tolerance as f32 / 255.0 } else { 0.0 };
+        let unsure = UNSURE * scene.tolerance as f32 / (255.0 * scene.slope_behind_catchers());
+        let unsure = if is_integrated { unsure } else { 0.0 };
         let alpha = |pixel: usize| {
             if !chosen[pixel] {
                 return 0.0;
@@ -219,4 +220,44 @@ fn stops(window: Window, side: u32, all: &[f32], shares: &[f32]) -> impl Iterato
         126 - (light.to_bits() >> 23) as i32
     };
     window.parts(side, side).map(of_cell)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_is_raised_to_between_a_half_and_one() {
+        let window = Window { x: 8, y: 0, width: 12, height: 8 };
+        let light = |k: usize| if k % 12 < 8 { 0.011 } else { 900.0 };
+        // Half covered pixels have half of the light; one is not covered
+        let share = |k: usize| if k == 0 { 0.0 } else { 0.5 };
+        let shares: Vec<f32> = (0..96).map(share).collect();
+        let all: Vec<f32> = (0..96).map(|k| light(k) * share(k)).collect();
+        let stops: Vec<i32> = stops(window, 8, &all, &shares).collect();
+        assert_eq!(stops, [6, -10]);
+        let chosen = ChosenPixels { window, chosen: vec![true; 96], stops };
+        assert_eq!([[8, 0], [16, 0], [24, 0]].map(|at| chosen.stop(at, 8)), [Some(6), Some(-10), None]);
+        assert!(chosen.has([19, 7]) && !chosen.has([20, 7]) && !chosen.has([7, 0]));
+    }
+
+    #[test]
+    fn what_is_laid_over_takes_its_alpha() {
+        let window = Window { x: 0, y: 0, width: 3, height: 1 };
+        let color = Buffer::from(Plane::Color);
+        let film = |pixels: [[f32; 4]; 3]| Film {
+            size: [3, 1],
+            window,
+            planes: vec![("color".into(), color, PlaneVec::Floats(pixels.concat()))],
+        };
+        let pixel = [0.5, 0.25, 1.0, 0.5];
+        let mut picture = film([pixel; 3]);
+        let black = film([[9.0; 4], [9.0; 4], [0.25, 0.0, 0.5, 1.0]]);
+        // In light; in full; in part
+        let shadows = Shadows { window, shares: vec![1.0, 1.0, 0.5], alphas: vec![0.0, 0.5, 0.5], work: Vec::new() };
+        assert!(shadows.mixed().is_some_and(|mixed| mixed.chosen == [false, false, true]));
+        shadows.cover(&mut picture, Some(&black));
+        let expected = [pixel, [0.25, 0.125, 0.5, 0.75], [0.375, 0.125, 0.75, 0.75]];
+        assert_eq!(picture.floats(color), Some(&expected.concat()[..]));
+    }
 }

@@ -88,3 +88,29 @@ impl Bsdf {
         self.colors == Colors::BLACK && self.ambient.is_black()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_is_black_but_where_light_on_it_is_found() {
+        let desc = ShadowCatcherDesc { alpha: 0.25, single_sided: true };
+        let catcher = desc.compile(&mut CompileContext::default());
+        let ambient = crate::material::Ambient::default();
+        assert!(catcher.is_shadow_catcher() && catcher.plain_bsdf(&ambient).is_some_and(|bsdf| bsdf.is_black()));
+        let caught = catcher.as_caught();
+        let bsdf = caught.plain_bsdf(&ambient).expect("it has no textures");
+        assert!(caught.common.single_sided && bsdf.ambient == Rgb::new(0.25, 1.0, 0.0));
+        assert_eq!(bsdf.colors.0, [Rgb::WHITE, Rgb::BLACK, Rgb::BLACK]);
+        // All else hides it
+        assert!(Material::matte().as_caught().plain_bsdf(&ambient).is_some_and(|bsdf| bsdf.is_black()));
+    }
+
+    #[test]
+    fn alpha_is_a_part() {
+        let mut cx = CompileContext::default();
+        ShadowCatcherDesc { alpha: 1.5, single_sided: false }.compile(&mut cx);
+        assert!(cx.has_errors());
+    }
+}

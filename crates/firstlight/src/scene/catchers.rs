@@ -12,7 +12,7 @@ use super::place::compile_shapes;
 use super::{Scene, SceneDesc};
 use crate::color::{Display, Encoding, Rgb, ToneMapping};
 use crate::context::{Assets, CompileContext};
-use crate::light::Light;
+use crate::light::{FEW_LIGHTS, Light};
 use crate::material::{Ambient, Material};
 use crate::shape::MeshFiles;
 
@@ -26,10 +26,14 @@ pub(crate) struct Catchers {
 /// By so many stops light is raised where nothing is known of how much there is: into the part of the curve of
 /// [`DisplaySteps`](crate::color::DisplaySteps) beyond white, where errors count as parts of the value.
 const RAISED: f64 = 40.0;
+/// The part of the tolerance that light with shadows may be off where a background is shown: it is off by less than a
+/// third of what it may.
+const PART_OF_OPAQUE: f64 = 1.5;
 /// Shadows over a dark background are as exact as over one so many stops below white: other things may be behind them.
 const MOST_STOPS: i32 = 4;
 /// The part of the tolerance that the light without shadows may be off: it takes little time, and what is divided by it
-/// is to be as exact as the picture is.
+/// is to be as exact as the picture is. So may that of many lights with shadows: light cuts are off where nothing is
+/// hidden as well, and what they are off is no shadow.
 const PART_OF_TOLERANCE: f64 = 0.25;
 
 impl SceneDesc {
@@ -68,6 +72,11 @@ impl Scene {
         scene.materials.iter_mut().for_each(|material| *material = material.as_caught());
         scene.lights.iter_mut().for_each(Light::make_gray);
         scene.ambient = Ambient::new(Rgb::WHITE, Rgb::WHITE);
+        scene.tolerance *= match scene.lights.len() {
+            ..=FEW_LIGHTS if self.transparent => 1.0,
+            ..=FEW_LIGHTS => PART_OF_OPAQUE,
+            _ => PART_OF_TOLERANCE,
+        };
         if self.transparent {
             scene.display = Display { encoding: Encoding::Linear, exposure: 0.0, tone_mapping: ToneMapping::None };
         }
@@ -86,12 +95,22 @@ impl Scene {
         ((shown.to_bits() >> 23) as i32 - 126).max(-MOST_STOPS)
     }
 
+    /// By how much less than alpha what is shown of a bright background changes: the slope of the display curve at white.
+    pub(crate) fn slope_behind_catchers(&self) -> f32 {
+        match self.display.encoding {
+            _ if self.transparent => 1.0,
+            Encoding::Srgb => 0.44,
+            Encoding::Gamma(gamma) => (1.0 / gamma).min(1.0) as f32,
+            Encoding::Linear => 1.0,
+        }
+    }
+
     /// The same, in which nothing casts shadows. Errors count as parts of the light that arrives.
     pub(crate) fn with_unshadowed_catchers(&self, catchers: &Catchers) -> Scene {
         let mut scene = self.with_lit_catchers(catchers);
         scene.lights.iter_mut().for_each(|light| light.shadows = false);
         scene.display = Display { encoding: Encoding::Linear, exposure: RAISED, tone_mapping: ToneMapping::None };
-        scene.tolerance *= PART_OF_TOLERANCE;
+        scene.tolerance = self.tolerance * PART_OF_TOLERANCE;
         scene
     }
 }
