@@ -15,10 +15,7 @@ const OPTIONS: &[(&[&str], &str)] = &[
         "points on each area light are --samples N, camera rays in each pixel --aa N (N x N of them)",
     ),
     (&["--antialias", "--antialiasing", "--msaa"], "camera rays in each pixel are --aa N (N x N of them)"),
-    (
-        &["--quality", "-Q", "--preset"],
-        "edges are --aa N and --aa-mode full, area lights --samples N or --samples exact",
-    ),
+    (&["-Q", "--preset"], "edges are --aa N and --aa-mode full, area lights --samples N or --samples exact"),
     (
         &["--error", "--noise-threshold", "--adaptive-threshold", "--epsilon", "--precision"],
         "how far a pixel may be off is --tolerance T, in steps of an 8-bit picture",

@@ -72,7 +72,10 @@ pub(super) fn depth_scale(text: &str) -> Result<f64, String> {
 /// Reads the quality of JPEG files.
 pub(super) fn quality(text: &str) -> Result<u8, String> {
     let quality = text.parse().ok().filter(|quality| (1..=100).contains(quality));
-    quality.ok_or_else(|| "a whole number from 1 to 100 is needed; 90 loses little that can be seen".into())
+    quality.ok_or_else(|| {
+        "a whole number from 1 to 100 is needed, of JPEG files; how much a render does is --aa N and --aa-mode full"
+            .into()
+    })
 }
 
 /// Reads a tolerance in display steps.
