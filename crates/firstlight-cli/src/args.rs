@@ -249,6 +249,8 @@ pub enum AntialiasingMode {
     Adaptive,
     /// every camera ray is lit by itself
     Full,
+    /// each smooth part of a surface in a pixel is lit once, as graphics processors do
+    Multisample,
 }
 
 /// An axis of a model.

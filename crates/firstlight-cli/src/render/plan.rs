@@ -49,6 +49,8 @@ pub(super) struct Plan<'a> {
     pub view: Option<View>,
     pub margin: Option<f64>,
     pub time: f64,
+    /// Whether nothing was said of antialiasing and visibility.
+    pub mode_is_open: bool,
     /// Whether a moment was said: models play their first animation then.
     pub plays: bool,
     /// Those of each scene.
@@ -183,6 +185,7 @@ impl<'a> Plan<'a> {
             settings.aa_mode = match mode {
                 AntialiasingMode::Adaptive => AaMode::Adaptive,
                 AntialiasingMode::Full => AaMode::Full,
+                AntialiasingMode::Multisample => AaMode::Multisample,
             };
         }
 
@@ -223,6 +226,7 @@ impl<'a> Plan<'a> {
             view: args.view,
             margin: args.margin,
             time: args.time.unwrap_or(0.0),
+            mode_is_open: args.aa_mode.is_none() && args.visibility.is_none() && !args.reference,
             plays: args.time.is_some() || args.frames.is_some(),
             pictures,
             shard: args.shard,
@@ -399,6 +403,10 @@ impl<'a> Plan<'a> {
         self.frame(input)?;
 
         let mut settings = self.settings.clone();
+        // Nothing is compared with the picture of a model by itself: it is to be there soon
+        if input.studio.is_some() && self.mode_is_open {
+            settings.aa_mode = AaMode::Multisample;
+        }
         if settings.threads.is_none() {
             // A course file's wish, held to what --threads allows
             let threads = input.parsed.threads.map(|n| n.min(1024) as usize);

@@ -60,7 +60,9 @@ impl Scene {
         // Only integration, and light shared by several rays, depend on the tolerance
         let is_integrated =
             |light: &Light| light.said_samples() == SamplesDesc::Exact && !settings.renderer().samples_all();
-        if settings.renderer_of(self) == Renderer::Adaptive || self.lights.iter().any(is_integrated) {
+        if matches!(settings.renderer_of(self), Renderer::Adaptive | Renderer::Multisample)
+            || self.lights.iter().any(is_integrated)
+        {
             entries.push(("tolerance", self.tolerance.to_string()));
         }
         if let Some(time) = self.time {

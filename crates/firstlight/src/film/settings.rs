@@ -19,6 +19,10 @@ words! {
         Adaptive = "adaptive",
         /// Each of the n x n camera rays is lit by itself.
         Full = "full",
+        /// All n x n camera rays say what is seen; each smooth part of a surface in a pixel is looked up and lit at one
+        /// of them, as by multisampling on graphics processors. Shadows that are narrower than a pixel show steps. Of
+        /// more than 16 lights that is [`Adaptive`](Self::Adaptive).
+        Multisample = "multisample",
     }
 }
 
@@ -163,6 +167,7 @@ impl RenderSettings {
             (false, VisibilityMode::Traced, _) => Renderer::Traced,
             (false, VisibilityMode::Shafts, AaMode::Full) => Renderer::Full,
             (false, VisibilityMode::Shafts, AaMode::Adaptive) => Renderer::Adaptive,
+            (false, VisibilityMode::Shafts, AaMode::Multisample) => Renderer::Multisample,
         }
     }
 
@@ -183,6 +188,8 @@ pub(crate) enum Renderer {
     Full,
     /// Each surface is lit as often as it needs.
     Adaptive,
+    /// Each smooth part of a surface in a pixel is lit once.
+    Multisample,
 }
 
 impl Renderer {
@@ -193,7 +200,11 @@ impl Renderer {
 
     /// How edges are smoothed.
     pub fn aa_mode(self) -> AaMode {
-        if self == Renderer::Adaptive { AaMode::Adaptive } else { AaMode::Full }
+        match self {
+            Renderer::Adaptive => AaMode::Adaptive,
+            Renderer::Multisample => AaMode::Multisample,
+            Renderer::Reference | Renderer::Traced | Renderer::Full => AaMode::Full,
+        }
     }
 }
 

@@ -115,6 +115,8 @@ pub(crate) struct CellRenderer<'a> {
     /// Of one pixel: its camera rays, and their hits.
     rays: Vec<Ray>,
     ray_points: Vec<RayPoint>,
+    /// The rays of a pixel of which one stands for others, under multisampling.
+    samples: Vec<primary::Sample>,
     /// The layers of one ray.
     stack: LayerStack,
     hits: PixelHits,
@@ -130,6 +132,8 @@ impl<'a> CellRenderer<'a> {
         let hits = PixelHits::new(lights.level(), scene.antialiasing);
         let many = lights.tree().map(|tree| Many::new(scene, tree, buffers));
         let few = if many.is_some() { 0 } else { scene.lights.len() };
+        // Many lights choose the points of a pixel themselves
+        let mode = if many.is_some() && mode == AaMode::Multisample { AaMode::Adaptive } else { mode };
         CellRenderer {
             scene,
             mode,
@@ -148,6 +152,7 @@ impl<'a> CellRenderer<'a> {
             fragments: Fragments::new(scene, many.is_some()),
             pixel_rays,
             rays: Vec::new(),
+            samples: Vec::new(),
             ray_points: Vec::new(),
             stack: LayerStack::default(),
             hits,
@@ -294,11 +299,12 @@ impl<'a> CellRenderer<'a> {
                 }
             }
         }
+        let is_adaptive = self.mode == AaMode::Adaptive;
         for at in self.cell_pixels() {
             let state = self.states[self.index(at)];
             let (shape, block) = match state {
                 PixelState::Done | PixelState::Traced => continue,
-                PixelState::Only(shape) if self.add_varied(at, shape, counts) => continue,
+                PixelState::Only(shape) if is_adaptive && self.add_varied(at, shape, counts) => continue,
                 PixelState::Only(shape) => (shape, None),
                 PixelState::Block(block) => {
                     let block = self.blocks[block as usize];
@@ -312,7 +318,7 @@ impl<'a> CellRenderer<'a> {
             let number = self.pixels.len() as u32;
             match block {
                 Some(SurfaceBlock { bsdf, means: None, .. })
-                    if self.fragments.add_whole(self.scene, number, at, shape, bsdf) =>
+                    if is_adaptive && self.fragments.add_whole(self.scene, number, at, shape, bsdf) =>
                 {
                     let pixel = self.pixel(at, QUADRANTS, counts);
                     self.pixels.push(pixel);
@@ -457,7 +463,7 @@ impl<'a> CellRenderer<'a> {
                 };
                 let is_dark = center.moments == Moments::ZERO;
                 center.moments.is_known()
-                    && (fragment.count == 1 || center.is_uniform && (is_dark || is_nearly_uniform()))
+                    && (fragment.rays.len() == 1 || center.is_uniform && (is_dark || is_nearly_uniform()))
             }
             _ => self.is_smooth_over_quadrants(fragment, light, estimates),
         }
@@ -541,7 +547,7 @@ impl<'a> CellRenderer<'a> {
             let estimates = self.estimate(ShadingRate::Ray, some, counts, go_on)?;
             let mut rest = &estimates[..];
             for FragmentQuery { fragment, light, .. } in some {
-                let Fragment { surface, share, rays, .. } = self.fragments.all[*fragment as usize].clone();
+                let Fragment { surface, share, rays, count, .. } = self.fragments.all[*fragment as usize].clone();
                 let own = rest.split_off(..rays.len()).unwrap_or_default();
                 let pixel = self.pixel_of(*fragment as usize);
                 self.sums.work[pixel] += Heat::PLACE * rays.len() as f32;
@@ -564,6 +570,9 @@ impl<'a> CellRenderer<'a> {
                     let before = counts.work();
                     sum += pooled.estimate(&mut self.lights, counts).terms;
                     self.sums.work[pixel] += counts.work() - before;
+                }
+                if count as usize != rays.len() {
+                    sum = sum * (count as f32 / rays.len() as f32);
                 }
                 *self.term(*fragment, *light) += sum;
             }

@@ -9,6 +9,7 @@ use crate::ids::SurfaceId;
 use crate::integrate::TOLERANCE;
 use crate::material::{Bsdf, Colors, ShadingPoint};
 use crate::math::{DVec3, Ray, Vec3};
+use crate::render::AaMode;
 use crate::scene::Scene;
 
 /// Fragments of at most so many rays have no quadrants.
@@ -22,6 +23,8 @@ pub(crate) struct RayPoint {
     pub point: ShadingPoint,
     /// Column and row in the pixel of the ray.
     pub at: [u16; 2],
+    /// The number of rays that it stands for.
+    pub count: u32,
     /// Whether the ray has several shading points: those of layers and of the surface behind them, or those of a clear
     /// coat and of its base.
     pub is_layered: bool,
@@ -45,7 +48,7 @@ pub(crate) struct Fragment {
     pub surface: SurfaceId,
     /// The mean of the materials of its rays.
     pub mean: MeanBsdf,
-    /// The number of rays of the pixel that hit it.
+    /// The number of rays of the pixel that hit it; under multisampling one of them stands for all.
     pub count: u32,
     /// The share of the pixel by which its errors are judged.
     pub share: f32,
@@ -134,12 +137,14 @@ impl Fragments {
     }
 
     /// Adds fragments for some rays of a pixel, number `number` of those with fragments: one for each surface, or one
-    /// for each ray unless `grouped`.
-    pub fn add(&mut self, scene: &Scene, number: u32, at: [u32; 2], rays: &mut Vec<RayPoint>, grouped: bool) {
+    /// for each ray under full antialiasing. Under multisampling what is opaque was grouped before, and of the rays of
+    /// a layer one stands for all.
+    pub fn add(&mut self, scene: &Scene, number: u32, at: [u32; 2], rays: &mut Vec<RayPoint>, mode: AaMode) {
         let all = (scene.antialiasing * scene.antialiasing) as f32;
         while let Some(RayPoint { shape, point, is_layered, .. }) = rays.first().copied() {
             let first = self.rays.len();
-            let (mut is_first, mut last) = (true, None);
+            let (mut is_first, mut last, mut count) = (true, None, 0);
+            let grouped = mode == AaMode::Adaptive || mode == AaMode::Multisample && is_layered;
             rays.retain(|ray| {
                 let is_same = || ray.shape == shape && (shape.is_some() || is_one_surface(&point, &ray.point));
                 // Of several layers of one surface on a ray, each is in a fragment of its own
@@ -147,17 +152,32 @@ impl Fragments {
                     || grouped && ray.is_layered == is_layered && last != Some(ray.at) && is_same();
                 if is_alike {
                     last = Some(ray.at);
+                    count += ray.count;
                     self.rays.push(ray.point);
                     self.at.push(ray.at);
                 }
                 !is_alike
             });
-            let share = if grouped { (self.rays.len() - first) as f32 / all } else { 1.0 };
-            self.push(scene, number, at, shape, first, share, is_layered);
+            let share = if mode == AaMode::Full { 1.0 } else { count as f32 / all };
+            if mode == AaMode::Multisample {
+                self.keep_one(first);
+            }
+            self.push(scene, number, at, shape, first, count, share, is_layered);
         }
     }
 
-    /// Adds a fragment of the rays from number `first` on.
+    /// Leaves the middle one of the rays from number `first` on, with the mean of their materials.
+    fn keep_one(&mut self, first: usize) {
+        let middle = first + (self.rays.len() - first) / 2;
+        if let Some(mean) = MeanBsdf::of(self.rays[first..].iter().map(|ray| ray.bsdf)) {
+            self.rays[middle].bsdf = mean.bsdf;
+        }
+        (self.rays[first], self.at[first]) = (self.rays[middle], self.at[middle]);
+        self.rays.truncate(first + 1);
+        self.at.truncate(first + 1);
+    }
+
+    /// Adds a fragment of the rays from number `first` on, which stand for `count`.
     #[allow(clippy::too_many_arguments, reason = "a pixel, and what all rays of the fragment have")]
     fn push(
         &mut self,
@@ -166,6 +186,7 @@ impl Fragments {
         at: [u32; 2],
         shape: Option<VisibleShape>,
         first: usize,
+        count: u32,
         share: f32,
         is_layered: bool,
     ) {
@@ -183,14 +204,14 @@ impl Fragments {
             // It is used only where the light is proved to vary little
             let closed_form_budget = f32::INFINITY;
             self.points.push(ShadingPoint { share, most_motion: -1.0, closed_form_budget, ..center });
-            self.parts.push((rays.len() as u32, Colors::BLACK));
+            self.parts.push((count, Colors::BLACK));
         }
         self.all.push(Fragment {
             pixel,
             shape,
             surface: self.rays[first].surface,
             mean,
-            count: rays.len() as u32,
+            count,
             share,
             is_layered,
             center: points..self.points.len(),

@@ -183,7 +183,7 @@ fn expose(
                 render_tile(scene, film, &mut Lanes::new(token), hits, &go_on)
             }
             Renderer::Full if is_sampled => Shafts::new(scene, &targets, token).render(film, &go_on),
-            Renderer::Full | Renderer::Adaptive => {
+            Renderer::Full | Renderer::Adaptive | Renderer::Multisample => {
                 // Memory is reused from tile to tile
                 let used = spare.lock().expect("no thread panics while it holds a renderer").pop();
                 let mut cells = used.unwrap_or_else(|| {

@@ -83,7 +83,7 @@ impl CellRenderer<'_> {
             return ControlFlow::Continue(());
         }
         self.begin_shadows(counts);
-        if self.mode == AaMode::Adaptive {
+        if self.mode != AaMode::Full {
             self.penumbra_grid(counts, go_on)?;
         }
         let mut next = 0;
@@ -155,11 +155,11 @@ impl CellRenderer<'_> {
     fn classify_fragments(&mut self, first: usize, counts: &mut Counts) -> usize {
         let (mut fragments, mut rays, mut next) = (Vec::new(), 0, first);
         while let Some(fragment) = self.fragments.all.get(next)
-            && (rays == 0 || rays + fragment.count as usize <= TOGETHER)
+            && (rays == 0 || rays + fragment.rays.len() <= TOGETHER)
         {
             // By roundings all rays may miss the fragment
             if fragment.count > 0 && self.is_open(next) {
-                rays += fragment.count as usize;
+                rays += fragment.rays.len();
                 fragments.push(next);
             }
             next += 1;
@@ -295,7 +295,7 @@ impl CellRenderer<'_> {
         for ((fragment, rays_of), pooled) in fragments.into_iter().zip(pools) {
             let before = counts.work();
             let mut pooled = pooled.estimate(&mut self.lights, counts);
-            let per_kept = rays_of.len() as f32 / rays.kept(&rays_of) as f32;
+            let per_kept = self.fragments.all[fragment].count as f32 / rays.kept(&rays_of) as f32;
             (pooled.terms, pooled.moments) = (pooled.terms * per_kept, pooled.moments * per_kept);
             let pixel = self.pixel_of(fragment);
             self.sums.work[pixel] += each + counts.work() - before;

@@ -9,9 +9,10 @@ use super::{CellRenderer, Pixel, PixelState};
 use crate::film::hits::camera_ray;
 use crate::film::resolve::PixelTerms;
 use crate::film::tile::Tile;
+use crate::ids::MaterialId;
 use crate::integrate::TOLERANCE;
 use crate::material::{LightTerm, ShadingPoint};
-use crate::math::Ray;
+use crate::math::{Ray, Vec2, Vec3};
 use crate::render::fragment::RayPoint;
 use crate::render::lighting_grid::SurfaceBlock;
 use crate::render::square::Square;
@@ -27,6 +28,66 @@ const SMALLEST: u32 = 2;
 const TEXTURED: u32 = 8;
 /// The most lobes of such a square: each has nodes of its own.
 const LOBES: usize = 4;
+
+/// Under multisampling: the cosine of the angle between shading normals beyond which parts of a surface are lit apart.
+const CREASE: f32 = 0.97;
+
+/// The hit of a camera ray, before anything is looked up there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sample {
+    /// The number of the ray in its pixel.
+    k: u32,
+    seen: (Option<VisibleShape>, Hit),
+    material: Option<MaterialId>,
+    p: Vec3,
+    /// The facet's normal and the shading normal.
+    normals: [Vec3; 2],
+}
+
+impl Sample {
+    fn new(scene: &Scene, k: u32, ray: &Ray, seen: (Option<VisibleShape>, Hit)) -> Self {
+        let (geometry, hit) = (&scene.geometry, &seen.1);
+        let material = geometry.surfaces[hit.surface.index()].material;
+        let material = material.is_none().then(|| geometry.face_material(hit));
+        // Shapes that are no meshes are one part each
+        let normals = if seen.0.is_some() { [Vec3::ZERO; 2] } else { geometry.normals(ray, hit) };
+        Sample { k, seen, material, p: ray.o + ray.d * hit.t as f32, normals }
+    }
+
+    /// Whether one point may stand for both: they are on one surface of one material, without a crease or a gap.
+    fn is_near(&self, other: &Sample) -> bool {
+        let ((shape, hit), (other_shape, other_hit)) = (&self.seen, &other.seen);
+        if hit.surface != other_hit.surface || shape != other_shape || self.material != other.material {
+            return false;
+        }
+        let apart = other.p - self.p;
+        let off = apart.dot(self.normals[0]).abs().max(apart.dot(other.normals[0]).abs());
+        shape.is_some() || self.normals[1].dot(other.normals[1]) > CREASE && off <= 0.5 * apart.length()
+    }
+
+    /// Takes a part of a surface out of the samples of a pixel of `n` x `n` rays: the sample nearest to the middle of
+    /// the part, and the number of all that it stands for. `None` if none are left.
+    fn take_part(samples: &mut Vec<Sample>, n: u32) -> Option<(Sample, u32)> {
+        let first = *samples.first()?;
+        let place = |sample: &Sample| Vec2::new((sample.k % n) as f32, (sample.k / n) as f32);
+        let (mut part, mut sum) = (ArrayVec::<Sample, MOST_SAMPLES>::new(), Vec2::ZERO);
+        samples.retain(|sample| {
+            let is_near = !part.is_full() && first.is_near(sample);
+            if is_near {
+                part.push(*sample);
+                sum += place(sample);
+            }
+            !is_near
+        });
+        let middle = sum / part.len() as f32;
+        let off = |sample: &Sample| (place(sample) - middle).length_squared();
+        let nearest = part.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
+        Some((*nearest, part.len() as u32))
+    }
+}
+
+/// The most rays that one stands for.
+const MOST_SAMPLES: usize = 64;
 
 /// What a camera ray hits, and the shape if that is one by itself.
 type Seen = Option<(Option<VisibleShape>, Hit)>;
@@ -48,7 +109,7 @@ impl CellRenderer<'_> {
             }
             return;
         }
-        if self.mode == AaMode::Adaptive
+        if self.mode != AaMode::Full
             && let Some(only) = frustum.single_shape(scene, &near)
         {
             return if self.many.is_some() {
@@ -129,6 +190,8 @@ impl CellRenderer<'_> {
         let (scene, n) = (self.scene, self.scene.antialiasing);
         let mut pixel = self.pixel([i, j], n * n, counts);
         let (mut rays, mut points) = (std::mem::take(&mut self.rays), std::mem::take(&mut self.ray_points));
+        let mut samples = std::mem::take(&mut self.samples);
+        samples.clear();
         rays.clear();
         rays.extend_from_slice(self.pixel_rays.of(scene, [i, j]));
         for (k, ray) in (0..).zip(&rays) {
@@ -139,15 +202,17 @@ impl CellRenderer<'_> {
             };
             let end = seen(self, at, ray);
             let mut left = 1.0;
+            let mut is_past_layers = false;
             if with_layers {
                 let stack = &mut self.stack;
                 scene.find_layers(ray, &differential(), end.as_ref().map(|(_, hit)| hit), stack);
                 left = stack.left;
+                is_past_layers = !stack.layers.is_empty();
                 for Layer { surface, weight, .. } in &stack.layers {
                     pixel.terms.emission.add(scene.emission(surface), f64::from(*weight));
                     let point = ShadingPoint::of(surface, &scene.bsdf(surface).weighted(*weight), &scene.ambient);
                     let all = iter::once(point).chain(scene.further_points(surface, *weight));
-                    points.extend(all.map(|point| RayPoint { shape: None, point, at, is_layered: true }));
+                    points.extend(all.map(|point| RayPoint { shape: None, point, at, count: 1, is_layered: true }));
                 }
                 if left == 0.0 {
                     continue;
@@ -161,38 +226,71 @@ impl CellRenderer<'_> {
                 pixel.terms.emission.add(scene.lights[light].radiance, left.into());
                 continue;
             }
-            let mut further = ArrayVec::new();
-            // A shape has one normal at each point, without maps
-            let shape = shape.filter(|_| !scene.geometry.is_mapped(&hit));
-            let point = match shape {
-                Some(shape) => {
-                    let bsdf = self.fragments.plain_bsdf(scene, shape).unwrap_or_else(|| {
-                        let si = shape.interaction(scene, ray, hit.t, &differential());
-                        pixel.terms.emission.add(scene.emission(&si), left.into());
-                        further = scene.further_points(&si, left);
-                        scene.bsdf(&si)
-                    });
-                    let bsdf = bsdf.weighted(left);
-                    shape.point(scene, ray, hit.t, &bsdf)
-                }
-                None => {
-                    let si = scene.local_surface(ray, &hit, &differential());
-                    pixel.terms.emission.add(scene.emission(&si), left.into());
-                    further = scene.further_points(&si, left);
-                    ShadingPoint::of(&si, &scene.bsdf(&si).weighted(left), &scene.ambient)
-                }
-            };
-            let is_layered = left != 1.0 || !further.is_empty();
-            points.push(RayPoint { shape, point, at, is_layered });
-            points.extend(further.into_iter().map(|point| RayPoint { shape, point, at, is_layered }));
+            if self.mode == AaMode::Multisample && !is_past_layers {
+                samples.push(Sample::new(scene, k, ray, (shape, hit)));
+                continue;
+            }
+            let of = (ray, differential(), at, 1, left);
+            self.add_point(&mut pixel, (shape, hit), of, &mut points);
         }
+        // One of each smooth part of a surface is looked up, over the footprint of the pixel
+        while let Some((chosen, count)) = Sample::take_part(&mut samples, n) {
+            let Sample { k, seen, .. } = chosen;
+            let [x, y] = [k % n, k / n];
+            let place = |corner: u32, at: u32| corner as f32 + (at as f32 + 0.5) / n as f32;
+            let differential = match scene.needs_differentials() {
+                false => RayDifferential::default(),
+                true => scene.camera.local_ray(place(i, x), place(j, y), 1.0).1,
+            };
+            let of = (&rays[k as usize], differential, [x, y].map(|at| at as u16), count, 1.0);
+            self.add_point(&mut pixel, seen, of, &mut points);
+        }
+        self.samples = samples;
         if scene.leaves_out_black {
             points.retain(|ray| !ray.point.bsdf.is_black());
         }
         let number = self.pixels.len() as u32;
         self.pixels.push(pixel);
-        self.fragments.add(scene, number, [i, j], &mut points, self.mode == AaMode::Adaptive);
+        self.fragments.add(scene, number, [i, j], &mut points, self.mode);
         (self.rays, self.ray_points) = (rays, points);
+    }
+
+    /// Adds the shading points of a hit: of a ray, its differential, its place in the pixel, the rays that it stands
+    /// for, and the part of each that is left.
+    #[allow(clippy::type_complexity, reason = "a ray and what is known of it")]
+    fn add_point(
+        &self,
+        pixel: &mut Pixel,
+        (shape, hit): (Option<VisibleShape>, Hit),
+        (ray, differential, at, count, left): (&Ray, RayDifferential, [u16; 2], u32, f32),
+        points: &mut Vec<RayPoint>,
+    ) {
+        let scene = self.scene;
+        let seen = f64::from(left) * f64::from(count);
+        let mut further = ArrayVec::new();
+        // A shape has one normal at each point, without maps
+        let shape = shape.filter(|_| !scene.geometry.is_mapped(&hit));
+        let point = match shape {
+            Some(shape) => {
+                let bsdf = self.fragments.plain_bsdf(scene, shape).unwrap_or_else(|| {
+                    let si = shape.interaction(scene, ray, hit.t, &differential);
+                    pixel.terms.emission.add(scene.emission(&si), seen);
+                    further = scene.further_points(&si, left);
+                    scene.bsdf(&si)
+                });
+                let bsdf = bsdf.weighted(left);
+                shape.point(scene, ray, hit.t, &bsdf)
+            }
+            None => {
+                let si = scene.local_surface(ray, &hit, &differential);
+                pixel.terms.emission.add(scene.emission(&si), seen);
+                further = scene.further_points(&si, left);
+                ShadingPoint::of(&si, &scene.bsdf(&si).weighted(left), &scene.ambient)
+            }
+        };
+        let is_layered = left != 1.0 || !further.is_empty();
+        points.push(RayPoint { shape, point, at, count, is_layered });
+        points.extend(further.into_iter().map(|point| RayPoint { shape, point, at, count, is_layered }));
     }
 
     /// Adds the blocks of a square that provably sees one shape: one of each lobe.
