@@ -25,8 +25,10 @@ use crate::visibility::{Viewpoint, Visibility};
 
 /// Pixels across the smallest square that is interpolated.
 const SMALLEST: u32 = 4;
-/// Pilot rays of a pixel: they detect shadows between the nodes.
-const PILOT_RAYS: usize = 16;
+/// Cells of the light that pilot rays of a pixel are aimed at, one at each, for a tolerance of 1 and less; for larger
+/// ones fewer of them, down to the fewest. They detect shadows between the nodes.
+const PILOT_CELLS: usize = 16;
+const FEWEST_PILOT_RAYS: usize = 4;
 /// Pixels across a block whose pilot rays are traced together.
 const BLOCK: u32 = 4;
 
@@ -34,13 +36,15 @@ const BLOCK: u32 = 4;
 /// row, of each column, and of all of a square.
 struct PilotTest {
     square: Square,
+    /// Pilot rays of a pixel.
+    rays: usize,
     sums: Vec<[f32; 2]>,
     is_passed: bool,
 }
 
 impl PilotTest {
-    fn new(square: Square) -> PilotTest {
-        PilotTest { square, sums: vec![[0.0; 2]; 2 * square.side as usize + 1], is_passed: true }
+    fn new(square: Square, rays: usize) -> PilotTest {
+        PilotTest { square, rays, sums: vec![[0.0; 2]; 2 * square.side as usize + 1], is_passed: true }
     }
 
     /// Adds a pixel, with its visible fractions by interpolation and by its pilot rays, not a number without those.
@@ -49,7 +53,7 @@ impl PilotTest {
             return;
         }
         // Of independent rays; so few do not prove a fraction of 0 or 1
-        let part = 1.0 / PILOT_RAYS as f32;
+        let part = 1.0 / self.rays as f32;
         let fraction = interpolated.clamp(part, 1.0 - part);
         let (off, variance) = (pilot - interpolated, fraction * (1.0 - fraction) * part);
         self.is_passed &= Self::is_by_chance([off, variance]);
@@ -219,6 +223,12 @@ impl CellRenderer<'_> {
         }
     }
 
+    /// Pilot rays of a pixel: the larger the tolerance, the fewer.
+    fn pilot_rays(&self) -> usize {
+        let of_tolerance = PILOT_CELLS as f64 / self.scene.tolerance().max(1.0);
+        (of_tolerance as usize).next_power_of_two().clamp(FEWEST_PILOT_RAYS, PILOT_CELLS)
+    }
+
     /// Traces the pilot rays of a block of pixels: one ray of every pixel to its point of a cell of the light after the
     /// other.
     fn trace_pilot_block(&mut self, [x, y]: [u32; 2], light: usize, counts: &mut Counts) {
@@ -229,23 +239,27 @@ impl CellRenderer<'_> {
         let (mut all, mut hidden) = ([0u32; LANES], [0.0f32; LANES]);
         // Of the rays of a packet, by pixel: what layers stop of the light
         let mut dimmed = [0.0f32; LANES];
-        for cell in 0..PILOT_RAYS {
+        let rays_of_pixel = self.pilot_rays();
+        let step = PILOT_CELLS / rays_of_pixel;
+        // Blocks beside each other look at other cells
+        let first = (x / BLOCK + 2 * (y / BLOCK)) as usize % step;
+        for cell in (0..rays_of_pixel).map(|ray| first + ray * step) {
             for inner in 0..LANES {
                 let rays = self.rays_of(at(inner));
                 if rays.is_empty() {
                     continue;
                 }
                 // Each camera ray once, if there are as many
-                let turn = (at(inner)[0] * 7 + at(inner)[1] * 3) as usize % PILOT_RAYS;
+                let turn = (at(inner)[0] * 7 + at(inner)[1] * 3) as usize % PILOT_CELLS;
                 let point = Viewpoint::of(&rays[(cell ^ turn) % rays.len()]);
-                let l = sampler.point(inner, PILOT_RAYS, cell) - point.p;
+                let l = sampler.point(inner, PILOT_CELLS, cell) - point.p;
                 if point.horizon.dot(l) > 0.0 && point.ns.dot(l) > 0.0 {
                     all[inner] += 1;
                     if scene.occluded_by_lists(&point.ray(sampler.end(), l, true)) {
                         hidden[inner] += 1.0;
                     } else {
                         let packet = packet.get_or_insert_with(|| Packet::new(sampler.end(), &point));
-                        packet.add((inner * PILOT_RAYS + cell) as u32, &point, l, inner as u32);
+                        packet.add((inner * PILOT_CELLS + cell) as u32, &point, l, inner as u32);
                     }
                 }
             }
@@ -310,7 +324,7 @@ impl CellRenderer<'_> {
         // Rays to a one-sided ball also see points that emit nothing towards them
         let emitter = &self.lights.lights.emitters[light];
         if !matches!(emitter, Some(Emitter::Ball { both_sides: false, .. })) {
-            let mut test = PilotTest::new(square);
+            let mut test = PilotTest::new(square, self.pilot_rays());
             of.interpolate(&fractions, |at, fraction| test.add(at, fraction, self.pilot(self.index(at), light)));
             if !test.passes() {
                 return false;
