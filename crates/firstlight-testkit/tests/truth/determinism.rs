@@ -101,9 +101,10 @@ fn instruction_sets_do_not_matter() {
 
 #[test]
 fn instruction_sets_do_not_matter_to_integrals() {
+    let multisampled = RenderSettings { aa_mode: AaMode::Multisample, ..one_thread() };
     for desc in integrated_scenes() {
         let scene = compile(&desc);
-        for one in [adaptive(), every_ray()] {
+        for one in [adaptive(), multisampled.clone(), every_ray()] {
             let expected = with(one.clone(), &scene);
             for simd in SimdLevel::available() {
                 let got = with(RenderSettings { simd, ..one.clone() }, &scene);

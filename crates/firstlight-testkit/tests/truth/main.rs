@@ -23,6 +23,7 @@ mod materials;
 mod meshes;
 mod metals;
 mod motion;
+mod multisample;
 mod near;
 mod normals;
 mod proved;

@@ -101,7 +101,8 @@ pub struct SceneDesc {
 }
 
 impl SceneDesc {
-    /// The names of all files that it reads when it is compiled: pictures, meshes, point sets.
+    /// The names of all files that it reads when it is compiled: pictures, meshes, point sets, models. Models may name
+    /// further ones themselves.
     pub fn files_mut(&mut self) -> impl Iterator<Item = &mut FilePath> {
         let pictures = self.textures.iter_mut().filter_map(|(_, texture)| match texture {
             TextureDesc::Image(image) => Some(&mut image.file),
@@ -111,6 +112,7 @@ impl SceneDesc {
         let models = self.shapes.iter_mut().chain(grouped).filter_map(|shape| match shape {
             ShapeDesc::Mesh(mesh) => mesh.file.as_mut(),
             ShapeDesc::PointSet(points) => points.file.as_mut(),
+            ShapeDesc::Model(model) => Some(&mut model.file),
             _ => None,
         });
         pictures.chain(models)
