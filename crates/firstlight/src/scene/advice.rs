@@ -9,9 +9,9 @@ use crate::camera::Projection;
 use crate::context::{CompileContext, show};
 use crate::light::{Area, LightDesc, LightKind, Spot};
 use crate::material::Material;
-use crate::math::{DVec3, UNIT_ROUNDOFF};
+use crate::math::{DVec3, Ray, UNIT_ROUNDOFF};
 use crate::parallel;
-use crate::shape::Solid;
+use crate::shape::{RayDifferential, Solid};
 
 /// Camera rays along each side of the picture that look for something first: most often they find it.
 const FEW_RAYS: u64 = 24;
@@ -135,6 +135,12 @@ impl Search {
     }
 }
 
+/// Whether a camera ray meets something, be it only a veil.
+fn shows(scene: &Scene, ray: &Ray) -> bool {
+    let end = scene.intersect_local(ray);
+    end.is_some() || scene.first_opacity(ray, &RayDifferential::default(), None) > 0.0
+}
+
 /// Whether a ray through the middle of any of so many cells, across and down, of a part of the picture meets something.
 fn meets(scene: &Scene, sides: [[u32; 2]; 2], cells: [u64; 2]) -> bool {
     let at = |i: u64, axis: usize| {
@@ -143,7 +149,7 @@ fn meets(scene: &Scene, sides: [[u32; 2]; 2], cells: [u64; 2]) -> bool {
     };
     let misses = |row: usize| {
         let y = at(row as u64, 1);
-        (0..cells[0]).all(|column| scene.intersect_local(&scene.camera.local_ray(at(column, 0), y, 1.0).0).is_none())
+        (0..cells[0]).all(|column| !shows(scene, &scene.camera.local_ray(at(column, 0), y, 1.0).0))
     };
     !parallel::all(cells[1] as usize, 4, misses)
 }
@@ -437,6 +443,15 @@ mod tests {
     }
 
     #[test]
+    fn a_veil_is_in_the_picture() {
+        let veil = "[material.unlit.veil]\ncolor = 1\nalpha_mode = \"blend\"\nalpha = 0.2\n";
+        let ball = BALL.replace("radius = 1", "radius = 1\nmaterial = \"veil\"");
+        assert_eq!(said(&format!("{ball}{LIGHT}{veil}")), [""; 0]);
+        let clear = said(&format!("{ball}{LIGHT}{}", veil.replace("0.2", "0")));
+        assert!(clear.iter().any(|told| told.contains("no camera ray meets anything")), "{clear:?}");
+    }
+
+    #[test]
     fn a_model_that_falls_between_camera_rays() {
         // A needle along the line of sight of the camera that is found for it
         let mut assets = MemoryAssets::default();
@@ -618,8 +633,8 @@ mod tests {
         );
         assert_eq!(
             of("glTF\u{2}\0\0\0"),
-            ["folder/a.obj: looks like a binary glTF model (GLB), not like a mesh; that kind is not read yet; \
-                 export it as PLY, STL or OBJ"]
+            ["folder/a.obj: looks like a binary glTF model (GLB), not like a mesh; give it as a model, \
+                 or name it as the file of a [[model]]"]
         );
         let many: String = (0..9).map(|i| format!("usemtl m{i}\nf 1 2 3\n")).collect();
         assert_eq!(
