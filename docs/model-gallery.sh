@@ -21,16 +21,16 @@ picture() {
     failed=1
     return
   fi
-  "$program" render "$found" --size 400 --quiet "$@" -o "$pictures/model-$name.png" || failed=1
+  "$program" render "$found" --quiet "$@" -o "$pictures/model-$name.png" || failed=1
 }
 
-picture sofa GlamVelvetSofa.glb --variant 'Pale Pink'
-picture sofa-navy GlamVelvetSofa.glb --variant Navy --view -35,12
-picture spot spot.obj --view 150,15 --studio clay
-picture spheres MetalRoughSpheresNoTextures.gltf --view 20,10
+picture sofa GlamVelvetSofa.glb --variant 'Pale Pink' --size 400
+picture sofa-navy GlamVelvetSofa.glb --variant Navy --view -35,12 --size 400
+picture spot spot.obj --view 150,15 --studio clay --size 400
+picture spheres MetalRoughSpheresNoTextures.gltf --view 20,10 --size 400
 picture coat ClearCoatTest.glb --view front --size 500x500
 picture alpha AlphaBlendModeTest.glb --view 15,12 --size 800x300
-picture boxes SimpleInstancing.glb
-picture trees RecursiveSkeletons.glb --time 0.3 --view 25,25 --margin 0.1
-picture orientation OrientationTest.gltf --studio hard
+picture boxes SimpleInstancing.glb --size 400
+picture trees RecursiveSkeletons.glb --time 0.3 --view 25,25 --margin 0.1 --size 400
+picture orientation OrientationTest.gltf --studio hard --size 400
 exit $failed

@@ -38,12 +38,12 @@ pub(crate) struct ShownMesh<'a> {
 pub(crate) fn describe_mesh(data: &MeshData, shown_mesh: &ShownMesh<'_>) -> ModelParts {
     let ShownMesh { file, smooth_deg, unlit, chosen, .. } = *shown_mesh;
     let mut parts = ModelParts::default();
+    let taken = |name: &str| data.materials.iter().any(|own| material_name(file, own, unlit) == name);
+    let default = unique(material_name(file, "default", unlit), taken);
     let smooth_deg = smooth_deg.or(data.normals.is_empty().then_some(SMOOTH_DEG));
     let mut mesh = MeshDesc { file: Some(FilePath(file.to_owned())), smooth_deg, ..MeshDesc::default() };
     let size = data.used_bounds().map_or(0.0, |[low, high]| (high - low).length());
     let described = add_mtl(&mut parts, data, shown_mesh, size);
-    // An MTL file may call one of its own so
-    let default = unique(material_name(file, "default", unlit), |name| parts.materials.iter().any(|of| of.0 == name));
     let of_name = |name: &String| match chosen(name) {
         Some(chosen) => chosen,
         None if described.contains(name) => material_name(file, name, unlit),
