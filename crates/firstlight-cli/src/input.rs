@@ -150,7 +150,7 @@ fn refuse_options_of_models(scene: &Path, reading: &ReadingArgs) -> Result<(), F
         ("--smooth", model.smooth.is_some()),
         ("--variant", model.variant.is_some()),
         ("--animation", model.animation.is_some()),
-        ("--gltf-scene", model.scene.is_some()),
+        ("--gltf-scene", model.gltf_scene.is_some()),
     ];
     for (option, said) in options {
         if said && !is_model(scene) {
@@ -332,7 +332,7 @@ fn model_settings(model: &ModelArgs) -> StudioSettings {
         up: model.up.map(|up| if up == Axis::Z { UpAxis::Z } else { UpAxis::Y }),
         smooth_deg: model.smooth,
         variant: model.variant.clone(),
-        scene: model.scene,
+        scene: model.gltf_scene,
         animation: model.animation.clone(),
         ..StudioSettings::default()
     }

@@ -59,7 +59,7 @@ impl Foreign {
     pub fn hint(self, wanted: WantedFile) -> &'static str {
         match (self.family, wanted) {
             (FileFamily::Mesh, _) => "give it as a model, or name it as the file of a [[mesh]] or [[point_set]]",
-            (FileFamily::Gltf, _) => "give it as a model, or name it as the file of a [[model]]",
+            (FileFamily::Gltf, _) => "give it as a model (.glb, .gltf), or name it as the file of a [[model]]",
             (FileFamily::Model, _) => "that kind is not read yet; export it as glTF, OBJ, PLY or STL",
             (FileFamily::Cloud, _) => "that kind is not read yet; convert it to PLY",
             (FileFamily::Scene, _) => "scenes of other programs are not read; export their meshes as PLY or OBJ",

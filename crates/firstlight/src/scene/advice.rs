@@ -20,8 +20,9 @@ const MOST_RAYS: u64 = 1 << 25;
 /// Pixels around what is projected, for the rounding of rays.
 const AROUND: f64 = 1.0;
 
-/// Says what the scene as a whole may surprise with. `desc` is what it was made from, completed.
-pub(super) fn advise(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc) {
+/// Says what the scene as a whole may surprise with. `desc` is what it was made from, completed; `has_studio`: its
+/// lights are those of a studio, which nobody placed.
+pub(super) fn advise(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc, has_studio: bool) {
     let search = Search::of(scene);
     if scene.geometry.surfaces.is_empty() {
         if !search.met {
@@ -32,13 +33,15 @@ pub(super) fn advise(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc) {
     advise_light(cx, scene);
     advise_emission(cx, scene, desc);
     advise_catchers(cx, scene);
-    if !search.met
-        && scene.catchers.is_none()
-        && (scene.geometry.bounds().is_some() || !scene.geometry.unbounded.is_empty())
-    {
+    // The shadows on catchers may be what is to be seen, but not where a camera was found for what casts them
+    let may_show_shadows = scene.catchers.is_some()
+        && (scene.choices.framing.is_none() || scene.geometry.surfaces.iter().all(|surface| !surface.visible));
+    if !search.met && !may_show_shadows && (scene.geometry.bounds().is_some() || !scene.geometry.unbounded.is_empty()) {
         advise_view(cx, scene, desc, &search);
     }
-    advise_directions(cx, scene);
+    if !has_studio {
+        advise_directions(cx, scene);
+    }
     advise_digits(cx, scene);
 }
 
@@ -237,7 +240,8 @@ fn advise_view(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc, search:
     }
     let frame = scene.camera.frame();
     let (eye, forward) = (frame.position, frame.forward.as_dvec3());
-    let bounds = scene.geometry.bounds().map(|bounds| bounds.map(|corner| corner + scene.origin));
+    // Without the ground of a studio
+    let bounds = scene.summary.bounds.map(|bounds| bounds.map(DVec3::from));
     let (least, most) = match bounds {
         Some(bounds) => (show(&bounds[0].to_array()), show(&bounds[1].to_array())),
         None => (String::new(), String::new()),
@@ -633,8 +637,8 @@ mod tests {
         );
         assert_eq!(
             of("glTF\u{2}\0\0\0"),
-            ["folder/a.obj: looks like a binary glTF model (GLB), not like a mesh; give it as a model, \
-                 or name it as the file of a [[model]]"]
+            ["folder/a.obj: looks like a binary glTF model (GLB), not like a mesh; give it as a model (.glb, \
+                 .gltf), or name it as the file of a [[model]]"]
         );
         let many: String = (0..9).map(|i| format!("usemtl m{i}\nf 1 2 3\n")).collect();
         assert_eq!(

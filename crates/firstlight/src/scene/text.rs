@@ -251,8 +251,8 @@ mod tests {
             (
                 "a.gltf",
                 &gltf[..],
-                "looks like a glTF model, not like a firstlight scene; give it as a model, or name it as the file of a \
-                 [[model]]",
+                "looks like a glTF model, not like a firstlight scene; give it as a model (.glb, .gltf), or name it \
+                 as the file of a [[model]]",
             ),
             (
                 "a.toml",
