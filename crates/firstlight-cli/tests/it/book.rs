@@ -10,7 +10,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::common::{COURSE, Folder, SCENE};
+use crate::common::{COURSE, Folder, GLTF, SCENE};
 
 /// The program, asked for less: smaller pictures, fewer rays, two frames.
 const SMALL: &str = r#"#!/bin/sh
@@ -58,23 +58,6 @@ const OBJ: &str = "\
 v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1
 f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8
 ";
-
-/// A triangle with a second variant, an animation, a camera and a light.
-const GLTF: &str = r#"{"asset":{"version":"2.0"},"buffers":[{"byteLength":68,
-"uri":"data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAEAAAAAAAAAAAAAAAAAAAIA/AAAAAAAAAAA="}],
-"bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":8},{"buffer":0,
-"byteOffset":44,"byteLength":24}],"accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":3},
-{"bufferView":1,"componentType":5126,"type":"SCALAR","count":2},{"bufferView":2,"componentType":5126,
-"type":"VEC3","count":2}],"materials":[{"name":"oak","doubleSided":true},{"name":"walnut","doubleSided":true}],
-"meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0,
-"extensions":{"KHR_materials_variants":{"mappings":[{"variants":[1],"material":1}]}}}]}],
-"cameras":[{"type":"perspective","perspective":{"yfov":1}}],"nodes":[{"name":"seat","mesh":0},{"name":"entry",
-"camera":0,"translation":[0.3,0.3,3]},{"name":"lamp","translation":[0,2,2],
-"extensions":{"KHR_lights_punctual":{"light":0}}}],"animations":[{"name":"fold","channels":[{"sampler":0,
-"target":{"node":0,"path":"translation"}}],"samplers":[{"input":1,"output":2}]}],
-"extensions":{"KHR_materials_variants":{"variants":[{"name":"light"},{"name":"dark"}]},
-"KHR_lights_punctual":{"lights":[{"type":"point","intensity":20}]}}}
-"#;
 
 /// A tetrahedron.
 const PLY: &str = "\
