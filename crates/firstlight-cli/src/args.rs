@@ -149,9 +149,9 @@ Examples:
 /// Where a scene comes from.
 #[derive(Args, Debug)]
 pub struct SceneArgs {
-    /// A scene file (.toml, .json, or a course file .txt), a model (.ply, .stl, .obj), the name of a built-in scene
-    /// such as config23 (see `firstlight scenes`; a file of such a name is ./config23), or - for standard input, a
-    /// scene or a model
+    /// A scene file (.toml, .json, or a course file .txt), a model (.glb, .gltf, .obj, .ply, .stl), the name of a
+    /// built-in scene such as config23 (see `firstlight scenes`; a file of such a name is ./config23), or - for standard
+    /// input, a scene or a model
     #[arg(value_name = "SCENE", value_hint = ValueHint::FilePath)]
     pub scene: PathBuf,
     #[command(flatten)]
@@ -205,8 +205,8 @@ pub struct ModelArgs {
     #[arg(long, value_name = "NAME")]
     pub animation: Option<String>,
     /// The scene of a glTF model, by its number from 0 on [default: the one that the file shows]
-    #[arg(long = "gltf-scene", value_name = "NUMBER")]
-    pub scene: Option<u32>,
+    #[arg(long, value_name = "NUMBER")]
+    pub gltf_scene: Option<u32>,
 }
 
 /// `--studio`
@@ -282,22 +282,22 @@ fn angle(text: &str) -> Result<f64, String> {
 /// `firstlight render`
 #[derive(Args, Debug)]
 pub struct RenderArgs {
-    /// A scene file (.toml, .json, or a course file .txt), a model (.ply, .stl, .obj), the name of a built-in scene
-    /// such as config23 (see `firstlight scenes`; a file of such a name is ./config23), or - for standard input, a
-    /// scene or a model. A folder stands for the models in it and in the folders below, sorted by their paths, without
-    /// hidden ones and what lies behind links to folders. Several are rendered one after the other, also after one that
-    /// failed
+    /// A scene file (.toml, .json, or a course file .txt), a model (.glb, .gltf, .obj, .ply, .stl), the name of a
+    /// built-in scene such as config23 (see `firstlight scenes`; a file of such a name is ./config23), or - for standard
+    /// input, a scene or a model. A folder stands for the models in it and in the folders below, sorted by their paths,
+    /// without hidden ones and what lies behind links to folders. Several are rendered one after the other, also after
+    /// one that failed
     #[arg(value_name = "SCENE", value_hint = ValueHint::FilePath, default_value = "config11")]
     pub scenes: Vec<PathBuf>,
     #[command(flatten)]
     pub reading: ReadingArgs,
 
-    /// A picture to write: its ending, .png, .jpg, .exr, .npz, .npy or .hdr, says the format; - is standard output. With
-    /// NAME= before it, one buffer by itself, as in depth=depth.png (`firstlight buffers` lists them all), rendered
-    /// whatever --buffers says; a file whose own name has a = is written as ./a=b.png. {stem} in it is the scene's file
-    /// name without its ending, {name} the whole of it, {parent} the name of its folder; with several scenes one of
-    /// them is needed, in --heat and --stats too. {view} and {size} are those of several views and sizes. Folders are
-    /// there already, but for those that a placeholder names. May be given several times [default: the
+    /// A picture to write: its ending, .png, .jpg, .exr, .npz, .npy or .hdr, says the format; - is standard output.
+    /// With NAME= before it, one buffer by itself, as in depth=depth.png (`firstlight buffers` lists them all),
+    /// rendered whatever --buffers says; a file whose own name has a = is written as ./a=b.png. {stem} in it is the
+    /// scene's file name without its ending, {name} the whole of it, {parent} the name of its folder; with several
+    /// scenes one of them is needed, in --heat and --stats too. {view} and {size} are those of several views and sizes.
+    /// Folders are there already, but for those that a placeholder names. May be given several times [default: the
     /// scene's name with .png, or with .render.png where that is a file not written by firstlight; a course file's
     /// output_file; in the working folder]
     #[arg(short, long = "output", value_name = "[NAME=]FILE", value_hint = ValueHint::FilePath)]

@@ -9,7 +9,7 @@ use std::sync::Mutex;
 
 use firstlight::{
     AssetError, Assets, CompileCache, CompileOptions, Compiled, FolderAssets, Framing, MeshFormat, NoAssets, Parsed,
-    SceneDesc, Studio, StudioSettings, UpAxis, builtin_scenes, is_gltf,
+    SceneDesc, Studio, StudioSettings, UpAxis, builtin_scenes, gltf_animations, is_gltf,
 };
 
 use crate::args::{Axis, LightSource, ModelArgs, ReadingArgs, StudioName, Switch};
@@ -150,7 +150,7 @@ fn refuse_options_of_models(scene: &Path, reading: &ReadingArgs) -> Result<(), F
         ("--smooth", model.smooth.is_some()),
         ("--variant", model.variant.is_some()),
         ("--animation", model.animation.is_some()),
-        ("--gltf-scene", model.scene.is_some()),
+        ("--gltf-scene", model.gltf_scene.is_some()),
     ];
     for (option, said) in options {
         if said && !is_model(scene) {
@@ -332,7 +332,7 @@ fn model_settings(model: &ModelArgs) -> StudioSettings {
         up: model.up.map(|up| if up == Axis::Z { UpAxis::Z } else { UpAxis::Y }),
         smooth_deg: model.smooth,
         variant: model.variant.clone(),
-        scene: model.scene,
+        scene: model.gltf_scene,
         animation: model.animation.clone(),
         ..StudioSettings::default()
     }
@@ -386,10 +386,11 @@ impl Input {
         }
     }
 
-    /// Has a model by itself play its first animation, where none was named, and bring its cameras.
+    /// Has a glTF model by itself play its first animation, where none was named, and bring its cameras.
     pub fn show(&mut self, plays: bool, cameras: bool) {
-        let Some(mut studio) = self.studio.clone().filter(|_| plays || cameras) else { return };
-        if plays && studio.animation.is_none() {
+        let Some(mut studio) = self.studio.clone().filter(|_| (plays || cameras) && self.is_gltf()) else { return };
+        let is_animated = || self.model_bytes().is_ok_and(|bytes| !gltf_animations(&bytes).is_empty());
+        if plays && studio.animation.is_none() && is_animated() {
             studio.animation = Some("0".to_owned());
         }
         studio.cameras |= cameras;

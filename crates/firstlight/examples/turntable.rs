@@ -22,7 +22,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     turn(Path::new(&model), Path::new(&folder), pictures, 256)
 }
 
-/// Writes `pictures` pictures of a model (.glb, .gltf, .obj, .ply, .stl), seen from all around, to `000.png`, `001.png` and so on.
+/// Writes `pictures` pictures of a model (.glb, .gltf, .obj, .ply, .stl), seen from all around, to `000.png`, `001.png`
+/// and so on.
 fn turn(model: &Path, folder: &Path, pictures: u32, size: u32) -> Result<(), Box<dyn Error>> {
     let name = model.file_name().and_then(|name| name.to_str()).ok_or("the model's file has no name")?;
     let assets = FolderAssets::new(model.parent().unwrap_or(Path::new("")), &[]).map_err(|(_, why)| why)?;

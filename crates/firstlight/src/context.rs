@@ -203,6 +203,16 @@ impl PartialEq for OnCompile {
     }
 }
 
+/// A part of a model, which no text has.
+struct StandIn {
+    /// Where it stands.
+    path: String,
+    /// Where the model is described.
+    model: String,
+    /// Whether its fields are those of the model; else all that is wrong with it is wrong with the model's file.
+    has_fields: bool,
+}
+
 /// Collects the faults of a description while it is compiled. Every check answers with a usable value, so that one
 /// fault does not hide the next.
 #[derive(Default)]
@@ -219,6 +229,8 @@ pub(crate) struct CompileContext {
     pub(crate) memory: Option<u64>,
     /// Bytes that it takes with all that was asked for so far.
     taken: u64,
+    /// What stands in the description in place of models: faults of it are those of the models.
+    stand_ins: Vec<StandIn>,
     path: String,
     faults: Vec<Diagnostic>,
     /// What is said of scenes without errors.
@@ -380,7 +392,22 @@ impl CompileContext {
             path.push('.');
         }
         path.push_str(field);
+        let path = self.path_of_model(&path).unwrap_or(path);
         Diagnostic { severity, place: None, path, message, hint: hint.map(str::to_owned) }
+    }
+
+    /// Says that a part of the model at the current path stands at `path`.
+    pub(crate) fn stands_in(&mut self, path: String, has_fields: bool) {
+        self.stand_ins.push(StandIn { path, model: self.path.clone(), has_fields });
+    }
+
+    /// The path of the field of a model that a fault at `path` is about, if that is a part of one.
+    fn path_of_model(&self, path: &str) -> Option<String> {
+        self.stand_ins.iter().find_map(|part| {
+            let field = path.strip_prefix(&part.path)?;
+            let is_within = field.is_empty() || field.starts_with('.');
+            is_within.then(|| part.model.clone() + if part.has_fields { field } else { ".file" })
+        })
     }
 
     /// The whole path of `field`, for a fault that is found later.

@@ -96,7 +96,8 @@ pub use image::{
     false_colors, is_decoding, relative_differences, write_open, write_whole,
 };
 pub use import::{
-    ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, MtlNote, is_gltf, is_point_set, read_mesh,
+    ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, MtlNote, gltf_animations, is_gltf,
+    is_point_set, read_mesh,
 };
 pub use light::{
     DirectionalDesc, DiskLightDesc, EmitSides, Falloff, LightDesc, PointDesc, RectangleDesc, SampleSet,

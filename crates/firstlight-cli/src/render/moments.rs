@@ -246,17 +246,21 @@ impl Run<'_> {
 
     /// What there is to say where a moment was asked for and nothing changes with time.
     fn advice_on_time(&self, scene: &Scene) -> Option<Diagnostic> {
+        let (lacks, hint) = match self.input.studio {
+            Some(_) => ("the model has no animation", "of models, glTF files can have some"),
+            None => (
+                "the scene has no keys",
+                "keys = [{ time = 0, ... }, ...] in a transform move a shape, a light or the camera",
+            ),
+        };
         let message = match (self.plan.pictures.frames, scene.time()) {
             (Some(Frames { first, last }), None) => {
                 let frames = last - first + 1;
-                format!("the scene has no keys: the pictures of all {frames} frames are the same")
+                format!("{lacks}: the pictures of all {frames} frames are the same")
             }
-            (None, None) if self.plan.time != 0.0 => {
-                "the scene has no keys: its picture is the same at any --time".into()
-            }
+            (None, None) if self.plan.time != 0.0 => format!("{lacks}: its picture is the same at any --time"),
             _ => return None,
         };
-        let hint = "keys = [{ time = 0, ... }, ...] in a transform move a shape, a light or the camera";
         Some(self.note(&message, hint))
     }
 

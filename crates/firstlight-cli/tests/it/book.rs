@@ -10,7 +10,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::common::{COURSE, Folder, SCENE};
+use crate::common::{COURSE, Folder, GLTF, SCENE};
 
 /// The program, asked for less: smaller pictures, fewer rays, two frames.
 const SMALL: &str = r#"#!/bin/sh
@@ -182,6 +182,9 @@ fn workplace() -> Folder {
     folder.put("theirs.txt", COURSE);
     for name in ["bunny.obj", "spot.obj", "models/cube.obj"] {
         folder.put(name, OBJ);
+    }
+    for name in ["chair.gltf", "models/chair.gltf"] {
+        folder.put(name, GLTF);
     }
     for name in ["bunny.ply", "models/corner.ply"] {
         folder.put(name, PLY);

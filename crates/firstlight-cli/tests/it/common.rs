@@ -11,6 +11,23 @@ use tempfile::TempDir;
 /// Options that make any scene quick.
 pub const QUICK: [&str; 6] = ["--width", "24", "--aa", "1", "--samples", "4"];
 
+/// A triangle with a second variant, an animation, a camera and a light.
+pub const GLTF: &str = r#"{"asset":{"version":"2.0"},"buffers":[{"byteLength":68,
+"uri":"data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAEAAAAAAAAAAAAAAAAAAAIA/AAAAAAAAAAA="}],
+"bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":8},{"buffer":0,
+"byteOffset":44,"byteLength":24}],"accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":3},
+{"bufferView":1,"componentType":5126,"type":"SCALAR","count":2},{"bufferView":2,"componentType":5126,
+"type":"VEC3","count":2}],"materials":[{"name":"oak","doubleSided":true},{"name":"walnut","doubleSided":true}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0,
+"extensions":{"KHR_materials_variants":{"mappings":[{"variants":[1],"material":1}]}}}]}],
+"cameras":[{"type":"perspective","perspective":{"yfov":1}}],"nodes":[{"name":"seat","mesh":0},{"name":"entry",
+"camera":0,"translation":[0.3,0.3,3]},{"name":"lamp","translation":[0,2,2],
+"extensions":{"KHR_lights_punctual":{"light":0}}}],"animations":[{"name":"fold","channels":[{"sampler":0,
+"target":{"node":0,"path":"translation"}}],"samplers":[{"input":1,"output":2}]}],
+"extensions":{"KHR_materials_variants":{"variants":[{"name":"light"},{"name":"dark"}]},
+"KHR_lights_punctual":{"lights":[{"type":"point","intensity":20}]}}}
+"#;
+
 /// A small scene with a little of everything that needs no file. 36 x 24 pixels.
 pub const SCENE: &str = "\
 [render]

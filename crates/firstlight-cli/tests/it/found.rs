@@ -47,7 +47,8 @@ fn a_model_is_in_the_middle_from_every_side() {
     for view in ["front", "back", "left", "right", "top", "bottom", "iso", "-30,15"] {
         folder
             .run(&format!(
-                "render models/tetra.ply --size 100x60 --aa 1 --transparent --margin 0.1 --view {view} -o a.png"
+                "render models/tetra.ply --size 100x60 --aa 1 --transparent --ground off --margin 0.1 --view {view} \
+                 -o a.png"
             ))
             .done();
         let picture = Picture::decode(&folder.get("a.png"));
@@ -151,7 +152,10 @@ fn the_text_of_a_completed_scene_means_the_same_bits() {
     // To standard output: its files are seen from the working folder
     let text = folder.run(&format!("render models/tetra.ply {options} --print-scene")).done().text();
     assert!(text.contains("file = \"models/tetra.ply\"") && text.contains("[camera]"), "{text}");
-    assert!(text.contains("[[light.directional]]") && text.contains("background = [0.1, 0.2, 0.3]"), "{text}");
+    assert_eq!(text.matches("[[light.rectangle]]").count(), 3, "{text}");
+    for part in ["[[model]]", "name = \"ground\"", "display = \"neutral\"", "background = [0.1, 0.2, 0.3]"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
     folder.put("all.toml", &text);
     let run = folder.run("render all.toml -o b.exr").done();
     assert!(!run.stderr.contains("note:"), "{}", run.stderr);
@@ -172,7 +176,7 @@ fn the_text_of_a_completed_scene_means_the_same_bits() {
     // The same names of files: the same file, but for how the camera was found and the model read
     let all = |exr: &[u8]| {
         let mut file = firstlight::StoredPlanes::read(exr).unwrap();
-        file.receipt.entries.retain(|(key, _)| !["view", "margin", "up", "smooth_deg"].contains(&key.as_str()));
+        file.receipt.entries.retain(|(key, _)| !["view", "margin", "model"].contains(&key.as_str()));
         file
     };
     assert_eq!(all(&folder.get("d.exr")), all(&model));

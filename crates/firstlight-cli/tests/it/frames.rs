@@ -2,7 +2,7 @@
 
 use std::process::Stdio;
 
-use crate::common::{Folder, SCENE, ran};
+use crate::common::{Folder, GLTF, Picture, SCENE, ran};
 
 /// A small scene with a light that moves 1 m in a second.
 fn moving() -> Folder {
@@ -105,4 +105,32 @@ fn info_says_where_things_are_at_a_moment() {
         hash(folder.run("info scene.toml").text()),
         "the hash is that of the description"
     );
+}
+
+#[test]
+fn models_play_what_they_have() {
+    let folder = Folder::new();
+    folder.put("chair.gltf", GLTF);
+    folder.put("still.gltf", GLTF.replace("\"animations\"", "\"extras\""));
+    folder.put("still.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let quick = "--size 24 --aa 1 --studio flat --view front";
+    let render = |what: &str| {
+        folder.run(&format!("render {what} {quick} -o a.png")).done().says(&["wrote a.png"]);
+        Picture::decode(&folder.get("a.png"))
+    };
+    // Half of the way to the right at 1 s
+    assert!(render("chair.gltf") == render("chair.gltf --time 0"));
+    let moved = render("chair.gltf --time 1");
+    assert!(moved != render("chair.gltf"));
+    assert!(moved == render("chair.gltf --time 1 --animation fold"));
+    for still in ["still.gltf", "still.obj"] {
+        let rest = render(still);
+        assert!(rest == render(&format!("{still} --time 1")), "{still}");
+        let note = format!("note: {still}: the model has no animation: its picture is the same at any --time");
+        folder.run(&format!("render {still} {quick} --time 1 -o a.png")).done().says(&[&note]);
+    }
+    // Cameras likewise
+    folder.run("render chair.gltf --size 24 --aa 1 --camera entry -o a.png").done();
+    let run = folder.run("render still.obj --size 24 --aa 1 --camera entry -o a.png").exits(1);
+    assert!(run.says(&["no camera is called \"entry\""]).stderr.contains("error: still.obj: "));
 }

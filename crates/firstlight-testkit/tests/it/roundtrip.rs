@@ -200,6 +200,17 @@ fn point_set() -> impl Strategy<Value = PointSetDesc> {
     )
 }
 
+fn model() -> impl Strategy<Value = ModelDesc> {
+    let names = hash_map(text(), text(), 0..3).prop_map(|names| NameMap(names.into_iter().collect()));
+    let of_gltf = ([maybe(text()), maybe(text())], maybe(any::<u32>()), maybe(number()), any::<[bool; 2]>());
+    (text(), maybe(select(UpAxis::ALL)), names, of_gltf, maybe(number()), any::<bool>()).prop_map(
+        |(file, up, materials, ([variant, animation], scene, time, [lights, cameras]), smooth_deg, unlit)| {
+            let new = ModelDesc { up, materials, smooth_deg, unlit, ..ModelDesc::new(file.into()) };
+            ModelDesc { variant, scene, animation, time, lights, cameras, ..new }
+        },
+    )
+}
+
 fn shape() -> impl Strategy<Value = ShapeDesc> {
     let sphere = (vector(), number(), select(SphereUv::ALL))
         .prop_map(|(center, radius, uv)| SphereDesc { uv, ..SphereDesc::new(center, radius) });
@@ -238,6 +249,7 @@ fn shape() -> impl Strategy<Value = ShapeDesc> {
         with_common!(Mesh, mesh()),
         with_common!(PointSet, point_set()),
         with_common!(Instance, text().prop_map(InstanceDesc::new)),
+        with_common!(Model, model()),
     ]
 }
 

@@ -241,8 +241,10 @@ fn the_background_beside_things_in_light_is_untouched() {
              fov_y_deg = 30\n[material.shadow-catcher.catcher]\n[[rectangle]]\ncenter = [0, 0, 0]\nsize = [3, 3]\n\
              normal = [0, 1, 0]\n{ground}\n[[sphere]]\ncenter = [0, 2, 1]\nradius = 0.6\n\
              [[mesh]]\npositions = [[-2, 3, 0], [2, 3, 0], [0, 3.4, 0]]\ntriangles = [[0, 1, 2]]\n\
-             [[light.rectangle]]\ncenter = [-9, 3, 0]\ne0 = [0, 1, 0]\ne1 = [0, 0, 1]\nstrength = 60\nvisible = false\n\
-             [[light.rectangle]]\ncenter = [9, 3.2, 0]\ne0 = [0, 1, 0]\ne1 = [0, 0, 1]\nstrength = 60\nvisible = false\n"
+             [[light.rectangle]]\ncenter = [-9, 3, 0]\ne0 = [0, 1, 0]\ne1 = [0, 0, 1]\nstrength = 60\n\
+             visible = false\n\
+             [[light.rectangle]]\ncenter = [9, 3.2, 0]\ne0 = [0, 1, 0]\ne1 = [0, 0, 1]\nstrength = 60\n\
+             visible = false\n"
         );
         picture(&scene(&text), &RenderSettings::default()).pixels
     };

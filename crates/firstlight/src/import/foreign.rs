@@ -59,8 +59,8 @@ impl Foreign {
     pub fn hint(self, wanted: WantedFile) -> &'static str {
         match (self.family, wanted) {
             (FileFamily::Mesh, _) => "give it as a model, or name it as the file of a [[mesh]] or [[point_set]]",
-            (FileFamily::Gltf, _) => "give it as a model, or name it as the file of a [[model]]",
-            (FileFamily::Model, _) => "that kind is not read yet; export it as PLY, STL or OBJ",
+            (FileFamily::Gltf, _) => "give it as a model (.glb, .gltf), or name it as the file of a [[model]]",
+            (FileFamily::Model, _) => "that kind is not read yet; export it as glTF, OBJ, PLY or STL",
             (FileFamily::Cloud, _) => "that kind is not read yet; convert it to PLY",
             (FileFamily::Scene, _) => "scenes of other programs are not read; export their meshes as PLY or OBJ",
             (FileFamily::Picture, WantedFile::Scene) => {
@@ -68,9 +68,11 @@ impl Foreign {
             }
             (FileFamily::Archive, _) => "unpack it first",
             (FileFamily::Encoding, _) => "save it as UTF-8",
-            (FileFamily::Materials, _) => "give the OBJ file that belongs to it; materials are described in a scene",
+            (FileFamily::Materials, _) => "give the OBJ file that belongs to it, which brings its materials",
             (FileFamily::Picture | FileFamily::Other, WantedFile::Mesh) => "a mesh is a PLY, STL or OBJ file",
-            (FileFamily::Other, WantedFile::Scene) => "a scene is TOML or JSON text, a model a PLY, STL or OBJ file",
+            (FileFamily::Other, WantedFile::Scene) => {
+                "a scene is TOML or JSON text, a model a glTF, OBJ, PLY or STL file"
+            }
         }
     }
 }

@@ -42,6 +42,7 @@ pub use error::{ImportError, MeshPlace};
 pub use foreign::is_gltf;
 pub(crate) use foreign::{WantedFile, foreign};
 pub(crate) use given::from_own_origin;
+pub use gltf::gltf_animations;
 pub(crate) use gltf::{
     Contained, Gltf, GltfFault, GltfFiles, GltfNode, JsonPlace, MeshAddress, OpenFault, Pose, Uri, WithContained,
 };

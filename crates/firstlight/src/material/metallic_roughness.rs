@@ -94,7 +94,8 @@ impl MetallicRoughnessDesc {
         let normals = NormalMapping::of_map(cx, params, map, ("clearcoat_normal_scale", self.clearcoat_normal_scale));
         let coat = has_coat.then_some(Clearcoat { strength, roughness: roughness_of_coat, normals });
         let base_color = params.color(cx, "base_color", &self.base_color);
-        let specular_color = params.color(cx, "specular_color", &self.specular_color);
+        // A factor of a reflectance, which may be more than 1: the product is held to it
+        let specular_color = params.radiance(cx, "specular_color", &self.specular_color);
         let f0 = f0 * f0;
         let reflection =
             MetallicRoughness { base_color, metallic, roughness, f0, specular, specular_color, occlusion, coat };

@@ -26,8 +26,8 @@ table! {
     pub struct ShadowCatcherDesc {
         /// The alpha of the darkest shadow: 0 to 1. Less than 1 stands for light that comes from all around.
         pub alpha: f64 = 1.0,
-        /// Whether camera rays pass through from behind, the side that normals point away from, and see no shadow there.
-        /// Light is blocked from both sides all the same.
+        /// Whether camera rays pass through from behind, the side that normals point away from, and see no shadow
+        /// there. Light is blocked from both sides all the same.
         pub single_sided: bool = false,
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::{ModelParts, ModelShape, ModelWarning, MtlSettings, clay, material_name, read_mtl, shown};
+use super::{ModelParts, ModelShape, ModelWarning, MtlSettings, clay, material_name, read_mtl, shown, unique};
 use crate::context::{AssetError, Assets};
 use crate::describe::FilePath;
 use crate::describe::value::join_path;
@@ -38,7 +38,8 @@ pub(crate) struct ShownMesh<'a> {
 pub(crate) fn describe_mesh(data: &MeshData, shown_mesh: &ShownMesh<'_>) -> ModelParts {
     let ShownMesh { file, smooth_deg, unlit, chosen, .. } = *shown_mesh;
     let mut parts = ModelParts::default();
-    let default = material_name(file, "default", unlit);
+    let taken = |name: &str| data.materials.iter().any(|own| material_name(file, own, unlit) == name);
+    let default = unique(material_name(file, "default", unlit), taken);
     let smooth_deg = smooth_deg.or(data.normals.is_empty().then_some(SMOOTH_DEG));
     let mut mesh = MeshDesc { file: Some(FilePath(file.to_owned())), smooth_deg, ..MeshDesc::default() };
     let size = data.used_bounds().map_or(0.0, |[low, high]| (high - low).length());
@@ -66,7 +67,12 @@ fn add_mtl(parts: &mut ModelParts, data: &MeshData, shown_mesh: &ShownMesh<'_>, 
     let ShownMesh { file, unlit, chosen, assets, .. } = *shown_mesh;
     let folder = file.rsplit_once('/').map_or("", |(folder, _)| folder);
     let mut described = HashSet::new();
-    for written in &data.material_files {
+    // A name may hold blanks; where there is no file of such a name, the line has several
+    let names = data.material_files.iter().flat_map(|line| match read_beside(line, folder, assets) {
+        Some(_) => vec![line.as_str()],
+        None => line.split_whitespace().collect(),
+    });
+    for written in names {
         let Some((path, bytes)) = read_beside(written, folder, assets) else {
             let message = format!("{written:?}: there is no such file of materials");
             let hint = "its faces are of a light gray; an OBJ file needs its MTL files beside it";
@@ -150,4 +156,66 @@ pub(crate) fn describe_points(file: &str, is_unlit: bool) -> ModelParts {
     parts.materials.push((default, shown(clay(true), is_unlit)));
     parts.shapes.push(ModelShape { shape: ShapeDesc::PointSet(points), model_from_shape: DAffine3::IDENTITY });
     parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::MemoryAssets;
+    use crate::material::MaterialDesc;
+
+    /// What `a.obj` with one face of each material describes, beside files of materials.
+    fn described(names: &[&str], mtl_line: &str, files: &[(&str, &str)]) -> ModelParts {
+        let mut assets = MemoryAssets::default();
+        for (name, text) in files {
+            assets.files.insert((*name).into(), text.as_bytes().into());
+        }
+        let data = MeshData {
+            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            triangles: vec![[0, 1, 2]; names.len()],
+            face_materials: (0..names.len() as u32).collect(),
+            materials: names.iter().map(|name| (*name).to_owned()).collect(),
+            material_files: vec![mtl_line.to_owned()],
+            ..MeshData::default()
+        };
+        let chosen = |_: &str| None;
+        let shown = ShownMesh { file: "m/a.obj", smooth_deg: None, unlit: false, chosen: &chosen, assets: &assets };
+        describe_mesh(&data, &shown)
+    }
+
+    fn of_faces(parts: &ModelParts) -> &[String] {
+        match &parts.shapes[0].shape {
+            ShapeDesc::Mesh(mesh) => &mesh.materials,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_material_called_default_is_that_of_the_file() {
+        let files = [("m/a.mtl", "newmtl default\nKd 1 0 0\n")];
+        let parts = described(&["default", "other"], "a.mtl", &files);
+        assert_eq!(of_faces(&parts), ["m/a.obj/default", "m/a.obj/default 2"]);
+        let names: Vec<&str> = parts.materials.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["m/a.obj/default", "m/a.obj/default 2"]);
+        assert!(matches!(parts.materials[0].1, MaterialDesc::Phong(_)));
+        assert_eq!(parts.materials[1].1, clay(false));
+        assert_eq!(parts.warnings[0].message, "1 of its materials are described in no MTL file, \"other\" for one");
+    }
+
+    #[test]
+    fn a_line_names_one_file_with_blanks_or_several() {
+        let red = "newmtl red\nKd 1 0 0\n";
+        for (line, files) in [
+            ("my mat.mtl", &[("m/my mat.mtl", red)][..]),
+            ("none.mtl b.mtl", &[("m/b.mtl", red)]),
+            ("C:\\work\\b.mtl", &[("m/b.mtl", red)]),
+        ] {
+            let parts = described(&["red"], line, files);
+            assert_eq!(of_faces(&parts), ["m/a.obj/red"], "{line}");
+            assert!(parts.materials.iter().any(|(name, _)| name == "m/a.obj/red"), "{line}");
+        }
+        let parts = described(&["red"], "none.mtl b.mtl", &[("m/b.mtl", red)]);
+        assert_eq!(parts.warnings.len(), 1);
+        assert_eq!(parts.warnings[0].message, "\"none.mtl\": there is no such file of materials");
+    }
 }

@@ -1,4 +1,5 @@
-//! Model files as descriptions: the shapes, materials, textures, lights and cameras that a scene could have said itself.
+//! Model files as descriptions: the shapes, materials, textures, lights and cameras that a scene could have said
+//! itself.
 //!
 //! The station before is `import`, which reads bytes; the station after is the description of a scene, in which a
 //! `[[model]]` is replaced by what is here. Nothing here is compiled: what comes of a file can be written as text and

@@ -9,9 +9,9 @@ use crate::camera::Projection;
 use crate::context::{CompileContext, show};
 use crate::light::{Area, LightDesc, LightKind, Spot};
 use crate::material::Material;
-use crate::math::{DVec3, UNIT_ROUNDOFF};
+use crate::math::{DVec3, Ray, UNIT_ROUNDOFF};
 use crate::parallel;
-use crate::shape::Solid;
+use crate::shape::{RayDifferential, Solid};
 
 /// Camera rays along each side of the picture that look for something first: most often they find it.
 const FEW_RAYS: u64 = 24;
@@ -20,8 +20,9 @@ const MOST_RAYS: u64 = 1 << 25;
 /// Pixels around what is projected, for the rounding of rays.
 const AROUND: f64 = 1.0;
 
-/// Says what the scene as a whole may surprise with. `desc` is what it was made from, completed.
-pub(super) fn advise(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc) {
+/// Says what the scene as a whole may surprise with. `desc` is what it was made from, completed; `has_studio`: its
+/// lights are those of a studio, which nobody placed.
+pub(super) fn advise(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc, has_studio: bool) {
     let search = Search::of(scene);
     if scene.geometry.surfaces.is_empty() {
         if !search.met {
@@ -32,13 +33,15 @@ pub(super) fn advise(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc) {
     advise_light(cx, scene);
     advise_emission(cx, scene, desc);
     advise_catchers(cx, scene);
-    if !search.met
-        && scene.catchers.is_none()
-        && (scene.geometry.bounds().is_some() || !scene.geometry.unbounded.is_empty())
-    {
+    // The shadows on catchers may be what is to be seen, but not where a camera was found for what casts them
+    let may_show_shadows = scene.catchers.is_some()
+        && (scene.choices.framing.is_none() || scene.geometry.surfaces.iter().all(|surface| !surface.visible));
+    if !search.met && !may_show_shadows && (scene.geometry.bounds().is_some() || !scene.geometry.unbounded.is_empty()) {
         advise_view(cx, scene, desc, &search);
     }
-    advise_directions(cx, scene);
+    if !has_studio {
+        advise_directions(cx, scene);
+    }
     advise_digits(cx, scene);
 }
 
@@ -135,6 +138,12 @@ impl Search {
     }
 }
 
+/// Whether a camera ray meets something, be it only a veil.
+fn shows(scene: &Scene, ray: &Ray) -> bool {
+    let end = scene.intersect_local(ray);
+    end.is_some() || scene.first_opacity(ray, &RayDifferential::default(), None) > 0.0
+}
+
 /// Whether a ray through the middle of any of so many cells, across and down, of a part of the picture meets something.
 fn meets(scene: &Scene, sides: [[u32; 2]; 2], cells: [u64; 2]) -> bool {
     let at = |i: u64, axis: usize| {
@@ -143,7 +152,7 @@ fn meets(scene: &Scene, sides: [[u32; 2]; 2], cells: [u64; 2]) -> bool {
     };
     let misses = |row: usize| {
         let y = at(row as u64, 1);
-        (0..cells[0]).all(|column| scene.intersect_local(&scene.camera.local_ray(at(column, 0), y, 1.0).0).is_none())
+        (0..cells[0]).all(|column| !shows(scene, &scene.camera.local_ray(at(column, 0), y, 1.0).0))
     };
     !parallel::all(cells[1] as usize, 4, misses)
 }
@@ -231,7 +240,8 @@ fn advise_view(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc, search:
     }
     let frame = scene.camera.frame();
     let (eye, forward) = (frame.position, frame.forward.as_dvec3());
-    let bounds = scene.geometry.bounds().map(|bounds| bounds.map(|corner| corner + scene.origin));
+    // Without the ground of a studio
+    let bounds = scene.summary.bounds.map(|bounds| bounds.map(DVec3::from));
     let (least, most) = match bounds {
         Some(bounds) => (show(&bounds[0].to_array()), show(&bounds[1].to_array())),
         None => (String::new(), String::new()),
@@ -437,6 +447,15 @@ mod tests {
     }
 
     #[test]
+    fn a_veil_is_in_the_picture() {
+        let veil = "[material.unlit.veil]\ncolor = 1\nalpha_mode = \"blend\"\nalpha = 0.2\n";
+        let ball = BALL.replace("radius = 1", "radius = 1\nmaterial = \"veil\"");
+        assert_eq!(said(&format!("{ball}{LIGHT}{veil}")), [""; 0]);
+        let clear = said(&format!("{ball}{LIGHT}{}", veil.replace("0.2", "0")));
+        assert!(clear.iter().any(|told| told.contains("no camera ray meets anything")), "{clear:?}");
+    }
+
+    #[test]
     fn a_model_that_falls_between_camera_rays() {
         // A needle along the line of sight of the camera that is found for it
         let mut assets = MemoryAssets::default();
@@ -618,8 +637,8 @@ mod tests {
         );
         assert_eq!(
             of("glTF\u{2}\0\0\0"),
-            ["folder/a.obj: looks like a binary glTF model (GLB), not like a mesh; that kind is not read yet; \
-                 export it as PLY, STL or OBJ"]
+            ["folder/a.obj: looks like a binary glTF model (GLB), not like a mesh; give it as a model (.glb, \
+                 .gltf), or name it as the file of a [[model]]"]
         );
         let many: String = (0..9).map(|i| format!("usemtl m{i}\nf 1 2 3\n")).collect();
         assert_eq!(

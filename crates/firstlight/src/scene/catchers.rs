@@ -95,7 +95,8 @@ impl Scene {
         ((shown.to_bits() >> 23) as i32 - 126).max(-MOST_STOPS)
     }
 
-    /// By how much less than alpha what is shown of a bright background changes: the slope of the display curve at white.
+    /// By how much less than alpha what is shown of a bright background changes: the slope of the display curve at
+    /// white.
     pub(crate) fn slope_behind_catchers(&self) -> f32 {
         match self.display.encoding {
             _ if self.transparent => 1.0,

@@ -208,7 +208,7 @@ impl SceneDesc {
         };
         scene.catchers = shapes.compile_catchers(cx, assets, &files, &scene);
         scene.motion = self.compile_motion(cx, assets, (source, &files), (desc, added.ground.as_ref()), &scene);
-        advise(cx, &scene, desc);
+        advise(cx, &scene, desc, !added.lights.is_empty());
         Some((scene, added))
     }
 

@@ -1,13 +1,17 @@
 //! Models within a scene: each `[[model]]` is replaced by what its file describes, at a moment.
 
 use std::borrow::Cow;
+use std::cmp::Ordering;
 use std::collections::HashMap;
+use std::ops::Range;
 
 use super::SceneDesc;
 use crate::context::{Assets, CompileContext};
+use crate::describe::Family;
 use crate::describe::node::quoted;
 use crate::error::{SceneError, Severity};
 use crate::import::{MeshFormat, OpenFault, is_gltf, is_point_set};
+use crate::material::MaterialDesc;
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::model::{ModelParts, ShownMesh, ShownModel, describe_gltf, describe_mesh, describe_points, unique};
 use crate::shape::{GroupDesc, MeshFiles, ModelDesc, ShapeDesc, UpAxis, load_mesh_file, read_mesh_bytes, unreadable};
@@ -69,33 +73,52 @@ impl SceneDesc {
         shapes: Vec<ShapeDesc>,
     ) -> Vec<ShapeDesc> {
         let mut all = Vec::with_capacity(shapes.len());
-        let mut number = 0;
+        let mut ranges = Vec::new();
         for shape in shapes {
-            let ShapeDesc::Model(model) = shape else {
+            let ShapeDesc::Model(mut model) = shape else {
                 all.push(shape);
                 continue;
             };
-            cx.within(&format!("{prefix}model[{number}]"), |cx| {
+            let first = all.len();
+            cx.within(&format!("{prefix}model[{}]", ranges.len()), |cx| {
+                model.keep_known_materials(cx, &self.materials);
                 let parts = model.parts(cx, assets, files);
                 let placed = TransformDesc::compile_field(model.transform.as_deref(), cx);
                 if let Some((parts, up)) = parts {
                     let world_from_model = placed.unwrap_or(DAffine3::IDENTITY) * up;
-                    self.add_parts(&model, parts, world_from_model, &mut all, prefix.is_empty());
+                    self.add_parts(cx, &model, parts, world_from_model, &mut all, prefix.is_empty());
                 }
             });
-            number += 1;
+            ranges.push(first..all.len());
+        }
+        // Number the parts as they are compiled
+        let mut counts: HashMap<usize, usize> = HashMap::new();
+        for (i, shape) in all.iter().enumerate() {
+            let count = counts.entry(shape.kind_index()).or_default();
+            if let Ok(model) = ranges.binary_search_by(|range| order(range, i)) {
+                let part = format!("{prefix}{}[{count}]", shape.kind());
+                cx.within(&format!("{prefix}model[{model}]"), |cx| cx.stands_in(part, true));
+            }
+            *count += 1;
         }
         all
     }
 
     fn add_parts(
         &mut self,
+        cx: &mut CompileContext,
         model: &ModelDesc,
         parts: ModelParts,
         world_from_model: DAffine3,
         shapes: &mut Vec<ShapeDesc>,
         is_scene: bool,
     ) {
+        for (name, texture) in &parts.textures {
+            cx.stands_in(format!("texture.{}.{name}", texture.kind()), false);
+        }
+        for (name, material) in &parts.materials {
+            cx.stands_in(format!("material.{}.{name}", material.kind()), false);
+        }
         // A file that several models show brings the same names again
         add_new(&mut self.textures, parts.textures);
         add_new(&mut self.materials, parts.materials);
@@ -107,6 +130,7 @@ impl SceneDesc {
             let of = of.unwrap_or_else(|| {
                 let taken = |name: &str| self.groups.iter().any(|(other, _)| other == name);
                 let of = unique(name.clone(), taken);
+                cx.stands_in(format!("group.{of}.mesh[0]"), false);
                 self.groups.push((of.clone(), group));
                 of
             });
@@ -129,7 +153,7 @@ impl SceneDesc {
                 light.set_name(model.named(light.name().as_deref()));
                 self.lights.push(light);
             }
-            self.lights.sort_by_key(crate::describe::Family::kind_index);
+            self.lights.sort_by_key(Family::kind_index);
         }
         if model.cameras && is_scene {
             for (name, mut camera) in parts.cameras {
@@ -140,6 +164,15 @@ impl SceneDesc {
                 }
             }
         }
+    }
+}
+
+/// Where a range of numbers lies: before `i`, around it, or after it.
+fn order(range: &Range<usize>, i: usize) -> Ordering {
+    match () {
+        () if range.end <= i => Ordering::Less,
+        () if range.start > i => Ordering::Greater,
+        () => Ordering::Equal,
     }
 }
 
@@ -234,6 +267,23 @@ impl ModelDesc {
         let turned = DAffine3 { matrix3: DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y), translation: DVec3::ZERO };
         let up = if self.up.unwrap_or(up) == UpAxis::Z { turned } else { DAffine3::IDENTITY };
         Some((parts, up))
+    }
+
+    /// Refuses materials that the scene does not describe, and goes on without them.
+    fn keep_known_materials(&mut self, cx: &mut CompileContext, materials: &[(String, MaterialDesc)]) {
+        if self.material.is_none() && self.materials.0.is_empty() {
+            return;
+        }
+        let names: Vec<&str> = materials.iter().map(|(name, _)| name.as_str()).collect();
+        let mut is_known = |field: &str, name: &String| {
+            let is_known = names.contains(&name.as_str());
+            if !is_known {
+                cx.unknown(field, "material", name, &names);
+            }
+            is_known
+        };
+        self.material = self.material.take().filter(|name| is_known("material", name));
+        self.materials.0.retain(|(_, name)| is_known("materials", name));
     }
 
     /// What kind of file it is: by its ending, else by its content. `None` after an error.

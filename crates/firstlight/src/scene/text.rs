@@ -251,8 +251,8 @@ mod tests {
             (
                 "a.gltf",
                 &gltf[..],
-                "looks like a glTF model, not like a firstlight scene; that kind is not read yet; export it as PLY, \
-                 STL or OBJ",
+                "looks like a glTF model, not like a firstlight scene; give it as a model (.glb, .gltf), or name it \
+                 as the file of a [[model]]",
             ),
             (
                 "a.toml",

@@ -6,7 +6,7 @@ use super::json::JsonPlace;
 use super::{Gltf, GltfFault};
 
 /// The bytes of a buffer view.
-pub(super) struct BufferView<'a> {
+pub(super) struct ViewedBytes<'a> {
     pub bytes: &'a [u8],
     /// From one element to the next, where it is said.
     stride: Option<usize>,
@@ -99,7 +99,7 @@ struct Accessor<'a> {
 
 impl Gltf {
     /// The buffer view that `at` is the number of.
-    pub(super) fn view(&self, at: &JsonPlace<'_>) -> Result<BufferView<'_>, GltfFault> {
+    pub(super) fn view(&self, at: &JsonPlace<'_>) -> Result<ViewedBytes<'_>, GltfFault> {
         let view = self.root().of_index("bufferViews", at)?;
         let buffer = view.need("buffer")?;
         let index = buffer.index()?;
@@ -115,7 +115,7 @@ impl Gltf {
             return Err(view.fault(format!("{length} bytes from {offset} on are not in its buffer, which has {there}")));
         };
         let stride = view.get("byteStride").map(|stride| stride.index()).transpose()?;
-        Ok(BufferView { bytes: within, stride })
+        Ok(ViewedBytes { bytes: within, stride })
     }
 
     fn accessor(&self, at: &JsonPlace<'_>) -> Result<Accessor<'_>, GltfFault> {

@@ -32,7 +32,7 @@ enum Mode {
 }
 
 /// The values of a channel around a moment.
-struct Keys<'a> {
+struct SampledKeys<'a> {
     mode: Mode,
     values: &'a [f32],
     /// Numbers in a value.
@@ -97,7 +97,7 @@ impl Gltf {
         sampler: &JsonPlace<'_>,
         time: f64,
         width: Option<usize>,
-        read: impl FnOnce(&Keys<'_>) -> R,
+        read: impl FnOnce(&SampledKeys<'_>) -> R,
     ) -> Result<R, GltfFault> {
         let mode = match sampler.text_of("interpolation") {
             None | Some("LINEAR") => Mode::Linear,
@@ -123,11 +123,11 @@ impl Gltf {
         let [from, to] = keys.map(|key| f64::from(times[key]));
         let span = to - from;
         let between = if span > 0.0 { ((time - from) / span).clamp(0.0, 1.0) } else { 0.0 };
-        Ok(read(&Keys { mode, values: &values, width, keys, between, span }))
+        Ok(read(&SampledKeys { mode, values: &values, width, keys, between, span }))
     }
 }
 
-impl Keys<'_> {
+impl SampledKeys<'_> {
     /// Part `part` of a key: of cubic ones the tangent before, the value, the tangent behind.
     fn at(&self, key: usize, part: usize) -> impl Iterator<Item = f64> {
         let parts = if self.mode == Mode::CubicSpline { 3 } else { 1 };

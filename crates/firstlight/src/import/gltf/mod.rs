@@ -158,6 +158,14 @@ impl Gltf {
     }
 }
 
+/// The names of the animations of a glTF file, in its order; empty where an animation has none. Of what is no glTF file
+/// there are none.
+pub fn gltf_animations(bytes: &[u8]) -> Vec<String> {
+    let Ok(Container { json, .. }) = Container::open(bytes) else { return Vec::new() };
+    let animations = JsonPlace::root(&json).list("animations").unwrap_or_default();
+    animations.iter().map(|animation| animation.text_of("name").unwrap_or_default().to_owned()).collect()
+}
+
 /// The bytes of a buffer with a URI.
 fn buffer_of(at: &JsonPlace<'_>, uri: &str, folder: &str, read: &ReadFile<'_>) -> Result<Vec<u8>, GltfFault> {
     match Uri::of(uri, folder) {

@@ -83,8 +83,12 @@ impl Gltf {
     pub(crate) fn scene_nodes(&self, scene: Option<usize>) -> Result<Vec<usize>, GltfFault> {
         let root = self.root();
         let list = root.list("nodes")?;
-        let shown = scene.map_or_else(|| root.index_or("scene", 0), Ok)?;
-        let mut open: Vec<usize> = match root.count("scenes") {
+        let (shown, count) = (scene.map_or_else(|| root.index_or("scene", 0), Ok)?, root.count("scenes"));
+        if let Some(wanted) = scene.filter(|wanted| *wanted >= count.max(1)) {
+            let hint = format!("the file has {count}, counted from 0");
+            return Err(GltfFault { hint, ..root.fault(format!("there is no scene {wanted}")) });
+        }
+        let mut open: Vec<usize> = match count {
             // Without any scene all nodes are shown
             0 => {
                 let mut has_parent = vec![false; list.len()];

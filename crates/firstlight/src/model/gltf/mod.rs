@@ -6,6 +6,8 @@
 
 mod extensions;
 mod material;
+#[cfg(test)]
+mod tests;
 
 use std::collections::HashMap;
 
@@ -50,6 +52,7 @@ pub(crate) fn describe(gltf: &Gltf, shown: &ShownModel<'_>) -> Result<ModelParts
         shown,
         materials: Materials::new(gltf, shown)?,
         shared: shared_meshes(gltf, &order)?,
+        left_out: vec![false; gltf.root().count("meshes")],
         grouped: HashMap::new(),
         parts,
         placed: 0,
@@ -119,6 +122,8 @@ struct Importer<'a> {
     shown: &'a ShownModel<'a>,
     materials: Materials<'a>,
     shared: Vec<bool>,
+    /// The meshes without triangles that were told of.
+    left_out: Vec<bool>,
     /// The groups of shared meshes.
     grouped: HashMap<usize, String>,
     parts: ModelParts,
@@ -156,6 +161,15 @@ impl Importer<'_> {
         (mesh, name): (usize, String),
         pose: Option<&Pose>,
     ) -> Result<(), GltfFault> {
+        let shown = self.gltf.root().nth("meshes", mesh)?;
+        let modes = shown.list("primitives")?.into_iter().map(|primitive| primitive.index_or("mode", 4));
+        if modes.collect::<Result<Vec<_>, _>>()?.iter().all(|mode| *mode < 4) {
+            if !std::mem::replace(&mut self.left_out[mesh], true) {
+                let message = format!("{}: it holds no triangles, and is left out", shown.pointer());
+                self.warn(message, "points and lines of glTF files are not shown");
+            }
+            return Ok(());
+        }
         let is_skinned = at.get("skin").is_some();
         let is_posed = is_skinned || node.weights.is_some();
         let address = if is_posed { MeshAddress::Node(node.index, pose.copied()) } else { MeshAddress::Mesh(mesh) };

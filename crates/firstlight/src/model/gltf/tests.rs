@@ -1,0 +1,620 @@
+//! Small files made by hand, one feature each, and what they are described as.
+
+use serde_json::{Value, json};
+
+use super::{ShownModel, describe};
+use crate::camera::{CameraDesc, Projection};
+use crate::context::AssetError;
+use crate::describe::{Channel, ColorDesc, ColorParam, NumberParam};
+use crate::import::{Gltf, GltfFault};
+use crate::light::LightDesc;
+use crate::material::{AlphaMode, MaterialDesc, MetallicRoughnessDesc};
+use crate::math::{DAffine3, DVec3};
+use crate::model::{ModelParts, clay};
+use crate::shape::ShapeDesc;
+use crate::texture::{Filter, ImageTextureDesc, TextureDesc, Wrap};
+
+fn with_asset(mut file: Value) -> Value {
+    file["asset"] = json!({ "version": "2.0" });
+    file
+}
+
+/// The file `m/a.gltf`, whose buffers all hold `bytes`.
+fn open(file: Value, bytes: &[u8]) -> Gltf {
+    let read = |path: &str, _| if path == "m/a.bin" { Ok(bytes.to_vec()) } else { Err(AssetError::NotFound) };
+    let opened = Gltf::open("m/a.gltf", with_asset(file).to_string().as_bytes(), &read);
+    opened.unwrap_or_else(|fault| panic!("{fault:?}"))
+}
+
+const PLAIN: ShownModel<'static> = ShownModel {
+    file: "m/a.gltf",
+    variant: None,
+    scene: None,
+    animation: None,
+    time: None,
+    chosen: &|_| None,
+    unlit: false,
+};
+
+fn parts_of(file: Value) -> ModelParts {
+    describe(&open(file, &[]), &PLAIN).unwrap_or_else(|fault| panic!("{fault:?}"))
+}
+
+fn fault_of(file: Value, shown: &ShownModel<'_>) -> String {
+    let GltfFault { pointer, message, hint } = describe(&open(file, &[]), shown).expect_err("has a fault");
+    format!("{pointer}: {message}; {hint}")
+}
+
+fn warnings(parts: &ModelParts) -> Vec<String> {
+    parts.warnings.iter().map(|warning| format!("{}; {}", warning.message, warning.hint)).collect()
+}
+
+/// A file with one mesh of one primitive with this material, and four pictures that textures 0 to 3 show.
+fn file_with(material: Value) -> Value {
+    json!({
+        "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0 }] }],
+        "materials": [material],
+        "textures": [{ "source": 0 }, { "source": 1 }, { "source": 2 }, { "source": 3 }],
+        "images": [{ "uri": "t0.png" }, { "uri": "t1.png" }, { "uri": "t2.png" }, { "uri": "t3.jpg" }],
+    })
+}
+
+/// The material of such a file, which has no more than one.
+fn material(material: Value) -> MaterialDesc {
+    let mut parts = parts_of(file_with(material));
+    assert_eq!((parts.materials.len(), parts.warnings.len()), (1, 0), "{:?}", parts.warnings);
+    parts.materials.remove(0).1
+}
+
+fn metallic(of: Value) -> MetallicRoughnessDesc {
+    match material(of) {
+        MaterialDesc::MetallicRoughness(desc) => desc,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// The name of texture `number` of such a file.
+fn texture(number: usize) -> String {
+    format!("m/a.gltf/texture {number}")
+}
+
+fn colored(number: usize, factor: [f64; 3]) -> ColorParam {
+    ColorParam { factor: ColorDesc::from(factor), ..ColorParam::texture(texture(number)) }
+}
+
+fn channel(number: usize, channel: Channel, factor: f64, bias: f64) -> NumberParam {
+    NumberParam { factor, bias, ..NumberParam::channel(texture(number), channel) }
+}
+
+#[test]
+fn a_material_with_everything() {
+    let desc = metallic(json!({
+        "name": "paint",
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [0.2, 0.4, 0.6, 0.5],
+            "baseColorTexture": { "index": 0 },
+            "metallicFactor": 0.25,
+            "roughnessFactor": 0.75,
+            "metallicRoughnessTexture": { "index": 1 },
+        },
+        "normalTexture": { "index": 2, "scale": 0.5 },
+        "occlusionTexture": { "index": 1, "strength": 0.25 },
+        "emissiveTexture": { "index": 3 },
+        "emissiveFactor": [1, 0.5, 0],
+        "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 8 } },
+    }));
+    assert_eq!(desc.base_color, colored(0, [0.2, 0.4, 0.6]));
+    assert_eq!(desc.metallic, channel(1, Channel::B, 0.25, 0.0));
+    assert_eq!(desc.roughness, channel(1, Channel::G, 0.75, 0.0));
+    // 1 + strength (texture - 1)
+    assert_eq!(desc.occlusion, channel(1, Channel::R, 0.25, 0.75));
+    assert_eq!((desc.common.normal_map, desc.common.normal_scale), (Some(texture(2)), 0.5));
+    assert_eq!((desc.common.emissive, desc.common.emissive_strength), (colored(3, [1.0, 0.5, 0.0]), 8.0));
+    // Alpha does not count where the mode is OPAQUE
+    assert_eq!((desc.common.alpha_mode, desc.common.alpha), (AlphaMode::Opaque, NumberParam::constant(1.0)));
+    assert!(desc.common.single_sided);
+}
+
+#[test]
+fn a_material_that_says_nothing() {
+    let desc = metallic(json!({}));
+    assert_eq!(desc.base_color, ColorParam::gray(1.0));
+    assert_eq!([&desc.metallic, &desc.roughness], [&NumberParam::constant(1.0); 2]);
+    assert_eq!(desc.ior, 1.5);
+    // An emissive texture alone is black: its factor is 0
+    let dark = metallic(json!({ "emissiveTexture": { "index": 3 }, "doubleSided": true }));
+    assert_eq!(dark.common.emissive, ColorParam::gray(0.0));
+    assert!(!dark.common.single_sided);
+}
+
+#[test]
+fn alpha_is_that_of_pictures_that_have_one() {
+    let alpha = |mode: &str, picture: usize| {
+        let common = metallic(json!({
+            "alphaMode": mode,
+            "alphaCutoff": 0.3,
+            "pbrMetallicRoughness": { "baseColorFactor": [1, 1, 1, 0.5], "baseColorTexture": { "index": picture } },
+        }));
+        (common.common.alpha_mode, common.common.alpha, common.common.cutoff)
+    };
+    assert_eq!(alpha("MASK", 0), (AlphaMode::Mask, channel(0, Channel::A, 0.5, 0.0), 0.3));
+    assert_eq!(alpha("BLEND", 0), (AlphaMode::Blend, channel(0, Channel::A, 0.5, 0.0), 0.3));
+    // JPEG has none
+    assert_eq!(alpha("BLEND", 3), (AlphaMode::Blend, NumberParam::constant(0.5), 0.3));
+    assert_eq!(
+        fault_of(file_with(json!({ "alphaMode": "ADD" })), &PLAIN),
+        "/materials/0: \"ADD\" is none of OPAQUE, MASK and BLEND; the file is damaged or written wrongly: export it \
+         anew"
+    );
+}
+
+#[test]
+fn pictures_within_the_file_are_looked_at_for_alpha() {
+    let png = |kind: png::ColorType, texel: &[u8]| {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
+        encoder.set_color(kind);
+        encoder.write_header().and_then(|mut writer| writer.write_image_data(texel)).expect("is written");
+        bytes
+    };
+    for (bytes, has_alpha) in
+        [(png(png::ColorType::Rgb, &[1, 2, 3]), false), (png(png::ColorType::Rgba, &[1; 4]), true)]
+    {
+        let mut file = file_with(json!({
+            "alphaMode": "BLEND", "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } },
+        }));
+        file["images"] = json!([{ "bufferView": 0, "mimeType": "image/png", "name": "wood" }]);
+        file["textures"] = json!([{ "source": 0 }]);
+        file["buffers"] = json!([{ "uri": "a.bin", "byteLength": bytes.len() }]);
+        file["bufferViews"] = json!([{ "buffer": 0, "byteLength": bytes.len() }]);
+        let parts = describe(&open(file, &bytes), &PLAIN).unwrap_or_else(|fault| panic!("{fault:?}"));
+        let [(name, TextureDesc::Image(picture))] = &parts.textures[..] else { panic!("{:?}", parts.textures) };
+        assert_eq!((name.as_str(), picture.file.0.as_str()), ("m/a.gltf/wood", "m/a.gltf#image/0"));
+        let MaterialDesc::MetallicRoughness(desc) = &parts.materials[0].1 else { panic!() };
+        assert_eq!(desc.common.alpha.texture.is_some(), has_alpha);
+    }
+}
+
+#[test]
+fn extensions_of_materials() {
+    let desc = metallic(json!({ "extensions": {
+        "KHR_materials_ior": { "ior": 1.33 },
+        "KHR_materials_specular": {
+            "specularFactor": 0.5, "specularTexture": { "index": 0 },
+            "specularColorFactor": [2, 1, 0], "specularColorTexture": { "index": 1 },
+        },
+        "KHR_materials_clearcoat": {
+            "clearcoatFactor": 0.75, "clearcoatTexture": { "index": 0 },
+            "clearcoatRoughnessFactor": 0.25, "clearcoatRoughnessTexture": { "index": 1 },
+            "clearcoatNormalTexture": { "index": 2, "scale": 2 },
+        },
+    } }));
+    assert_eq!((desc.ior, desc.specular), (1.33, channel(0, Channel::A, 0.5, 0.0)));
+    // More than 1 is allowed of the factor
+    assert_eq!(desc.specular_color, colored(1, [2.0, 1.0, 0.0]));
+    assert_eq!(desc.clearcoat, channel(0, Channel::R, 0.75, 0.0));
+    assert_eq!(desc.clearcoat_roughness, channel(1, Channel::G, 0.25, 0.0));
+    assert_eq!((desc.clearcoat_normal_map, desc.clearcoat_normal_scale), (Some(texture(2)), 2.0));
+    // An index of 0 stands for all that is reflected; others below 1 do not exist
+    let ior = |ior: f64| metallic(json!({ "extensions": { "KHR_materials_ior": { "ior": ior } } })).ior;
+    assert_eq!([ior(0.0), ior(0.5), ior(1e9)], [0.0, 1.0, 100.0]);
+    // The alpha of a picture without one is 1
+    let specular = json!({ "extensions": { "KHR_materials_specular": { "specularTexture": { "index": 3 } } } });
+    assert_eq!(metallic(specular).specular, NumberParam::constant(1.0));
+}
+
+#[test]
+fn an_unlit_material_is_its_colour() {
+    let desc = material(json!({
+        "pbrMetallicRoughness": { "baseColorFactor": [0.1, 0.2, 0.3, 1], "baseColorTexture": { "index": 0 } },
+        "normalTexture": { "index": 1 },
+        "extensions": { "KHR_materials_unlit": {} },
+    }));
+    let MaterialDesc::Unlit(desc) = desc else { panic!("{desc:?}") };
+    assert_eq!((desc.color, desc.common.normal_map), (colored(0, [0.1, 0.2, 0.3]), None));
+}
+
+#[test]
+fn specular_glossiness_is_a_dielectric_that_reflects_its_specular_colour() {
+    let of = |picture: usize| {
+        metallic(json!({
+            "alphaMode": "BLEND",
+            // What is there for readers of metallic-roughness does not count
+            "pbrMetallicRoughness": { "baseColorFactor": [1, 0, 0, 1] },
+            "extensions": { "KHR_materials_pbrSpecularGlossiness": {
+                "diffuseFactor": [0.5, 0.25, 0.125, 0.75], "diffuseTexture": { "index": 0 },
+                "specularFactor": [0.1, 0.2, 0.3], "glossinessFactor": 0.75,
+                "specularGlossinessTexture": { "index": picture },
+            } },
+        }))
+    };
+    let desc = of(1);
+    assert_eq!(desc.base_color, colored(0, [0.5, 0.25, 0.125]));
+    assert_eq!((desc.ior, desc.specular_color), (0.0, colored(1, [0.1, 0.2, 0.3])));
+    assert_eq!(desc.metallic, MetallicRoughnessDesc::default().metallic);
+    // 1 - glossiness
+    assert_eq!(desc.roughness, channel(1, Channel::A, -0.75, 1.0));
+    assert_eq!(desc.common.alpha, channel(0, Channel::A, 0.75, 0.0));
+    assert_eq!(of(3).roughness, NumberParam::constant(0.25));
+}
+
+#[test]
+fn what_transmits_light_is_a_veil() {
+    let of = |texture: Value| {
+        let mut transmission = json!({ "transmissionFactor": 0.5 });
+        if !texture.is_null() {
+            transmission["transmissionTexture"] = texture;
+        }
+        let parts = parts_of(file_with(json!({
+            "name": "pane", "extensions": { "KHR_materials_transmission": transmission },
+        })));
+        assert_eq!(
+            warnings(&parts),
+            ["the material \"pane\" transmits light: it is shown as a thin veil; light is not bent or coloured by it"]
+        );
+        let MaterialDesc::MetallicRoughness(desc) = &parts.materials[0].1 else { panic!() };
+        assert_eq!(desc.common.alpha_mode, AlphaMode::Blend);
+        desc.common.alpha.clone()
+    };
+    // White: 0.5 x 0.85 x 1 of what is behind it
+    let alpha = of(Value::Null);
+    assert!((alpha.factor - 0.575).abs() < 1e-12 && alpha.texture.is_none(), "{alpha:?}");
+    let alpha = of(json!({ "index": 2 }));
+    assert_eq!((alpha.texture, alpha.channel, alpha.bias), (Some(texture(2)), Channel::R, 1.0));
+    assert!((alpha.factor + 0.425).abs() < 1e-12);
+    // Without a factor nothing is let through
+    let none = metallic(json!({ "extensions": { "KHR_materials_transmission": {} } }));
+    assert_eq!(none.common.alpha_mode, AlphaMode::Opaque);
+}
+
+/// The texture of a material with this reference to texture 0, which has a sampler.
+fn image(info: Value, sampler: Value) -> (ImageTextureDesc, Vec<String>) {
+    let mut file = file_with(json!({ "pbrMetallicRoughness": { "baseColorTexture": info } }));
+    file["textures"][0]["sampler"] = 0.into();
+    file["samplers"] = json!([sampler]);
+    let mut parts = parts_of(file);
+    let warnings = warnings(&parts);
+    match parts.textures.remove(0).1 {
+        TextureDesc::Image(image) => (image, warnings),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn samplers() {
+    let of = |sampler| {
+        let (image, warnings) = image(json!({ "index": 0 }), sampler);
+        assert_eq!((image.file.0.as_str(), warnings), ("m/t0.png", Vec::new()));
+        (image.wrap, image.filter)
+    };
+    assert_eq!(of(json!({})), ([Wrap::Repeat; 2], Filter::Anisotropic));
+    assert_eq!(
+        of(json!({ "wrapS": 33071, "wrapT": 33648, "magFilter": 9729, "minFilter": 9984 })),
+        ([Wrap::Clamp, Wrap::Mirror], Filter::Anisotropic)
+    );
+    assert_eq!(of(json!({ "wrapS": 10497, "magFilter": 9728 })), ([Wrap::Repeat; 2], Filter::Nearest));
+}
+
+#[test]
+fn sets_of_texture_coordinates() {
+    let of = |info| {
+        let (image, warnings) = image(info, json!({}));
+        (image.uv_set, warnings)
+    };
+    assert_eq!(of(json!({ "index": 0, "texCoord": 2 })), (Some(2), Vec::new()));
+    // That of the transform counts
+    let transform = json!({ "KHR_texture_transform": { "texCoord": 1 } });
+    assert_eq!(of(json!({ "index": 0, "texCoord": 2, "extensions": transform })), (Some(1), Vec::new()));
+    let warning = "/materials/0/pbrMetallicRoughness/baseColorTexture: set 5 of texture coordinates is not read; 0 to \
+                   3 are; set 0 is used instead";
+    assert_eq!(of(json!({ "index": 0, "texCoord": 5 })), (None, vec![warning.to_owned()]));
+}
+
+#[test]
+fn a_texture_transform_moves_points_as_on_paper() {
+    let (offset, rotation, scale) = ([0.25, 0.5], 0.4f64, [2.0, 3.0]);
+    let transform = json!({ "offset": offset, "rotation": rotation, "scale": scale });
+    let info = json!({ "index": 0, "extensions": { "KHR_texture_transform": transform } });
+    let desc = image(info, json!({})).0;
+    for [u, v] in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.3, 0.8]] {
+        // KHR_texture_transform, with v downwards
+        let (sin, cos) = pxfm::f_sincos(rotation);
+        let [su, sv] = [scale[0] * u, scale[1] * v];
+        let expected = [offset[0] + cos * su + sin * sv, 1.0 - (offset[1] - sin * su + cos * sv)];
+        // ImageTextureDesc, with v upwards
+        let (sin, cos) = pxfm::f_sincos(desc.rotate_deg.to_radians());
+        let [su, sv] = [desc.scale[0] * u, desc.scale[1] * (1.0 - v)];
+        let found = [cos * su - sin * sv + desc.offset[0], sin * su + cos * sv + desc.offset[1]];
+        for (found, expected) in found.into_iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-12, "{found}, not {expected}, of {u}, {v}");
+        }
+    }
+}
+
+#[test]
+fn textures_without_a_picture_are_left_out() {
+    let mut file = file_with(json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }));
+    file["textures"][0] = json!({ "extensions": { "KHR_texture_basisu": { "source": 0 } } });
+    let parts = parts_of(file.clone());
+    assert_eq!(
+        warnings(&parts),
+        ["/textures/0: the texture has no picture that can be read, and is left out; pictures are PNG, JPEG or WebP"]
+    );
+    assert!(parts.textures.is_empty());
+    file["textures"][0] = json!({ "source": 0, "extensions": { "EXT_texture_webp": { "source": 1 } } });
+    let parts = parts_of(file.clone());
+    let TextureDesc::Image(image) = &parts.textures[0].1 else { panic!() };
+    assert_eq!(image.file.0, "m/t1.png");
+    // Two textures of one picture are one
+    file["materials"][0]["emissiveTexture"] = json!({ "index": 1 });
+    file["materials"][0]["emissiveFactor"] = json!([1, 1, 1]);
+    assert_eq!(parts_of(file.clone()).textures.len(), 1);
+    file["textures"][0]["source"] = 9.into();
+    file["textures"][0]["extensions"] = Value::Null;
+    assert_eq!(
+        fault_of(file, &PLAIN),
+        "/textures/0/source: there is no number 9 in \"images\", which has 4; the file is damaged or written wrongly: \
+         export it anew"
+    );
+}
+
+#[test]
+fn variants_give_primitives_other_materials() {
+    let mapping = json!({ "KHR_materials_variants": { "mappings": [
+        { "variants": [1], "material": 1 }, { "variants": [0, 2], "material": 2 },
+    ] } });
+    let file = json!({
+        "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "primitives": [
+            { "attributes": { "POSITION": 0 }, "material": 0, "extensions": mapping },
+            { "attributes": { "POSITION": 0 }, "material": 0 },
+        ] }],
+        "materials": [{ "name": "red" }, { "name": "green" }, { "name": "blue" }],
+        "extensions": { "KHR_materials_variants": { "variants": [
+            { "name": "day" }, { "name": "night" }, { "name": "dawn" },
+        ] } },
+    });
+    let materials = |variant| {
+        let parts = describe(&open(file.clone(), &[]), &ShownModel { variant, ..PLAIN });
+        match &parts.unwrap_or_else(|fault| panic!("{fault:?}")).shapes[0].shape {
+            ShapeDesc::Mesh(mesh) => mesh.materials.clone(),
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(materials(None), ["m/a.gltf/red", "m/a.gltf/red"]);
+    assert_eq!(materials(Some("night")), ["m/a.gltf/green", "m/a.gltf/red"]);
+    assert_eq!(materials(Some("dawn")), ["m/a.gltf/blue", "m/a.gltf/red"]);
+    assert_eq!(
+        fault_of(file.clone(), &ShownModel { variant: Some("noon"), ..PLAIN }),
+        ": there is no variant \"noon\"; the file has \"day\", \"night\", \"dawn\""
+    );
+    // The scene's own in place of one of the file
+    let chosen = |name: &str| (name == "red").then(|| "mine".to_owned());
+    let parts = describe(&open(file, &[]), &ShownModel { chosen: &chosen, ..PLAIN }).expect("is read");
+    assert!(parts.materials.is_empty());
+}
+
+#[test]
+fn materials_are_called_as_the_file_calls_them() {
+    let primitives = json!([
+        { "attributes": { "POSITION": 0 }, "material": 0 },
+        { "attributes": { "POSITION": 0 }, "material": 1 },
+        { "attributes": { "POSITION": 0 }, "material": 2 },
+        { "attributes": { "POSITION": 0 } },
+        { "attributes": { "POSITION": 0, "COLOR_0": 0 } },
+    ]);
+    let file = json!({
+        "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "primitives": primitives }],
+        "materials": [{ "name": "default" }, { "name": "default" }, {}],
+    });
+    let parts = parts_of(file.clone());
+    let names: Vec<&str> = parts.materials.iter().map(|(name, _)| name.as_str()).collect();
+    let expected = ["default", "default 2", "material 2", "default 3", "default with colours"];
+    assert_eq!(names, expected.map(|name| format!("m/a.gltf/{name}")));
+    // Without a material: matte, and white below the colours of vertices
+    assert_eq!(parts.materials[3].1, clay(false));
+    assert_eq!(parts.materials[4].1, clay(true));
+    let unlit = describe(&open(file, &[]), &ShownModel { unlit: true, ..PLAIN }).expect("is read");
+    assert!(unlit.materials.iter().all(|(_, material)| matches!(material, MaterialDesc::Unlit(_))));
+    assert_eq!(unlit.materials[0].0, "m/a.gltf/default unlit");
+}
+
+/// What a file with one node with this extension, turned and moved, brings.
+fn lights(light: Value) -> ModelParts {
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    parts_of(json!({
+        "extensions": { "KHR_lights_punctual": { "lights": [light] } },
+        "nodes": [{
+            "name": "lamp",
+            "translation": [0, 3, 4],
+            // A quarter turn about x: -z becomes -y... the quaternion says it of +90 degrees
+            "rotation": [half, 0, 0, half],
+            "extensions": { "KHR_lights_punctual": { "light": 0 } },
+        }],
+    }))
+}
+
+fn near(a: [f64; 3], b: [f64; 3]) {
+    assert!((DVec3::from(a) - DVec3::from(b)).length() < 1e-9, "{a:?}, not {b:?}");
+}
+
+#[test]
+fn lights_shine_along_minus_z_of_their_nodes() {
+    // Turned by 90 degrees about x, -z is +y
+    let up = [0.0, 1.0, 0.0];
+    let parts = lights(json!({ "type": "directional", "color": [1, 0.5, 0], "intensity": 3 }));
+    let [LightDesc::Directional(sun)] = &parts.lights[..] else { panic!("{:?}", parts.lights) };
+    near(sun.direction, up);
+    assert_eq!((sun.name.as_deref(), sun.strength, sun.color.linear), (Some("lamp"), 3.0, [1.0, 0.5, 0.0]));
+
+    let parts = lights(json!({ "type": "point", "range": 5 }));
+    let [LightDesc::Point(point)] = &parts.lights[..] else { panic!("{:?}", parts.lights) };
+    assert_eq!((point.position, point.strength), ([0.0, 3.0, 4.0], 1.0));
+
+    // Half angles in radians become full angles in degrees
+    let cone = json!({ "innerConeAngle": 0.25, "outerConeAngle": 0.5 });
+    let parts = lights(json!({ "type": "spot", "spot": cone }));
+    let [LightDesc::Spot(spot)] = &parts.lights[..] else { panic!("{:?}", parts.lights) };
+    let [inner, outer] = [0.5f64, 1.0].map(f64::to_degrees);
+    assert_eq!((spot.cone_deg, spot.inner_cone_deg), (outer, Some(inner)));
+    near(spot.look_at, [0.0, 8.0, 4.0]);
+    let parts = lights(json!({ "type": "spot", "spot": {} }));
+    let [LightDesc::Spot(spot)] = &parts.lights[..] else { panic!("{:?}", parts.lights) };
+    assert!((spot.cone_deg - 90.0).abs() < 1e-9 && spot.inner_cone_deg == Some(0.0));
+
+    let parts = lights(json!({ "type": "ies" }));
+    assert_eq!(warnings(&parts), ["a light of the kind \"ies\" is left out; point, spot and directional are read"]);
+}
+
+#[test]
+fn cameras() {
+    let camera = |camera: Value| -> Vec<(String, CameraDesc)> {
+        parts_of(json!({
+            "cameras": [camera],
+            "nodes": [{ "camera": 0, "translation": [0, 0, 5] }, { "camera": 0, "name": "node 0" }],
+        }))
+        .cameras
+    };
+    let all = camera(json!({ "type": "perspective", "perspective": { "yfov": std::f64::consts::FRAC_PI_3 } }));
+    assert_eq!(all.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["node 0", "node 0 2"]);
+    let desc = &all[0].1;
+    assert!((desc.fov_y_deg.expect("is said") - 60.0).abs() < 1e-9);
+    assert_eq!((desc.position, desc.look_at, desc.up), ([0.0, 0.0, 5.0], [0.0; 3], [0.0, 1.0, 0.0]));
+    let all = camera(json!({ "type": "orthographic", "orthographic": { "xmag": 3, "ymag": 2 } }));
+    assert_eq!((all[0].1.projection, all[0].1.height), (Projection::Orthographic, Some(4.0)));
+}
+
+#[test]
+fn instances_and_shared_meshes_are_placed_groups() {
+    let bytes: Vec<u8> = [1.0f32, 2.0, 3.0, 4.0, 5.0, 6.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let file = json!({
+        "buffers": [{ "uri": "a.bin", "byteLength": bytes.len() }],
+        "bufferViews": [{ "buffer": 0, "byteLength": bytes.len() }],
+        "accessors": [{ "bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 2 }],
+        "meshes": [
+            { "name": "leaf", "primitives": [{ "attributes": { "POSITION": 0 } }] },
+            { "primitives": [{ "attributes": { "POSITION": 0 } }] },
+        ],
+        "nodes": [
+            {
+                "mesh": 0, "scale": [2, 2, 2],
+                "extensions": { "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": 0 } } },
+            },
+            { "mesh": 1, "name": "post" },
+            { "mesh": 0, "name": "fallen" },
+            { "mesh": 1, "name": "flat", "scale": [1, 0, 1] },
+        ],
+    });
+    let parts = describe(&open(file, &bytes), &PLAIN).unwrap_or_else(|fault| panic!("{fault:?}"));
+    let placed: Vec<(&str, DVec3)> = parts
+        .shapes
+        .iter()
+        .map(|part| match &part.shape {
+            ShapeDesc::Instance(instance) => {
+                (instance.name.as_deref().unwrap_or_default(), part.model_from_shape.translation)
+            }
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    let expected = [
+        ("leaf", DVec3::new(2.0, 4.0, 6.0)),
+        ("leaf", DVec3::new(8.0, 10.0, 12.0)),
+        ("post", DVec3::ZERO),
+        ("fallen", DVec3::ZERO),
+    ];
+    assert_eq!(placed, expected);
+    let groups: Vec<&str> = parts.groups.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(groups, ["m/a.gltf#mesh/0", "m/a.gltf#mesh/1"]);
+    assert_eq!(
+        warnings(&parts),
+        ["1 of \"flat\" are left out: a scale of 0, or numbers that are none; nothing of them could be seen"]
+    );
+}
+
+#[test]
+fn posed_meshes_have_addresses_of_their_own() {
+    let file = json!({
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }],
+        "nodes": [
+            { "mesh": 0, "weights": [0.5], "translation": [1, 0, 0] },
+            { "mesh": 0, "skin": 0, "translation": [1, 0, 0] },
+            { "translation": [0, 7, 0] },
+        ],
+        "skins": [{ "joints": [2] }],
+        "animations": [{ "name": "walk", "channels": [], "samplers": [] }],
+    });
+    let shapes = |animation, time| -> Vec<(String, DAffine3)> {
+        let parts = describe(&open(file.clone(), &[]), &ShownModel { animation, time, ..PLAIN });
+        let parts = parts.unwrap_or_else(|fault| panic!("{fault:?}"));
+        let address = |shape| match shape {
+            ShapeDesc::Mesh(mesh) => mesh.file.map(|file| file.0).unwrap_or_default(),
+            other => panic!("{other:?}"),
+        };
+        parts.shapes.into_iter().map(|part| (address(part.shape), part.model_from_shape)).collect()
+    };
+    let moved = DAffine3::from_translation(DVec3::X);
+    let at_rest = [("m/a.gltf#node/0", moved), ("m/a.gltf#node/1", DAffine3::IDENTITY)];
+    assert_eq!(shapes(None, None), at_rest.map(|(name, place)| (name.to_owned(), place)));
+    let walking = |shapes: Vec<(String, DAffine3)>| shapes[0].0.clone();
+    assert_eq!(walking(shapes(Some("walk"), Some(1.5))), "m/a.gltf#node/0/animation/0/time/1.5");
+    assert_eq!(walking(shapes(Some("0"), Some(1.5))), "m/a.gltf#node/0/animation/0/time/1.5");
+    assert_eq!(walking(shapes(None, Some(2.0))), "m/a.gltf#node/0/animation/0/time/2");
+    assert_eq!(
+        fault_of(file, &ShownModel { animation: Some("run"), ..PLAIN }),
+        ": there is no animation \"run\"; the file has \"walk\""
+    );
+}
+
+#[test]
+fn points_and_lines_are_left_out_once() {
+    let line = json!({ "attributes": { "POSITION": 0 }, "mode": 1 });
+    let parts = parts_of(json!({
+        "meshes": [{ "primitives": [line] }, { "primitives": [line, { "attributes": { "POSITION": 0 } }] }],
+        "nodes": [{ "mesh": 0 }, { "mesh": 0 }, { "mesh": 1 }],
+    }));
+    assert_eq!(
+        warnings(&parts),
+        ["/meshes/0: it holds no triangles, and is left out; points and lines of glTF files are not shown"]
+    );
+    assert_eq!(parts.shapes.len(), 1);
+}
+
+#[test]
+fn scenes_are_chosen_by_their_numbers() {
+    let file = json!({
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }],
+        "nodes": [{ "mesh": 0, "name": "a" }, { "mesh": 0, "name": "b" }],
+        "scene": 1,
+        "scenes": [{ "nodes": [0] }, { "nodes": [1] }],
+    });
+    let named = |scene| {
+        let parts = describe(&open(file.clone(), &[]), &ShownModel { scene, ..PLAIN }).expect("is read");
+        let ShapeDesc::Mesh(mesh) = &parts.shapes[0].shape else { panic!() };
+        mesh.name.clone().unwrap_or_default()
+    };
+    assert_eq!([named(None), named(Some(0)), named(Some(1))], ["b", "a", "b"]);
+    let asked = ShownModel { scene: Some(2), ..PLAIN };
+    assert_eq!(fault_of(file, &asked), ": there is no scene 2; the file has 2, counted from 0");
+    assert_eq!(fault_of(json!({ "nodes": [] }), &asked), ": there is no scene 2; the file has 0, counted from 0");
+}
+
+#[test]
+fn extensions_that_are_not_read() {
+    let parts = parts_of(json!({ "extensionsUsed": ["KHR_materials_sheen", "KHR_lights_punctual"] }));
+    assert_eq!(
+        warnings(&parts),
+        ["uses the extension KHR_materials_sheen, which is not read; what it adds is not shown"]
+    );
+    let needs = |name: &str| fault_of(json!({ "extensionsUsed": [name], "extensionsRequired": [name] }), &PLAIN);
+    assert_eq!(
+        needs("KHR_draco_mesh_compression"),
+        ": needs the extension KHR_draco_mesh_compression, which is not read; unpack it: `npx @gltf-transform/cli copy \
+         in.glb out.glb`"
+    );
+    assert_eq!(
+        needs("VENDOR_x"),
+        ": needs the extension VENDOR_x, which is not read; export it without that extension"
+    );
+}
