@@ -98,7 +98,7 @@ const GROUND_ALPHA: f64 = 0.7;
 /// Half of a side of the ground, in radii.
 const GROUND_REACH: f64 = 14.0;
 /// In display steps: larger than that of scenes, since nothing is compared with these pictures.
-const TOLERANCE: f64 = 4.0;
+const TOLERANCE: f64 = 8.0;
 
 impl Lamp {
     /// Towards the light, unit; `facing` is the azimuth of the camera.
