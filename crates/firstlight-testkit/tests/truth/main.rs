@@ -30,6 +30,7 @@ mod proved;
 mod relight;
 mod robust;
 mod shadow_catcher;
+mod studio;
 mod terminator;
 mod terms;
 mod uv_sets;

@@ -212,3 +212,57 @@ impl SceneDesc {
 fn ground_material() -> MaterialDesc {
     MaterialDesc::ShadowCatcher(ShadowCatcherDesc { alpha: GROUND_ALPHA, ..ShadowCatcherDesc::default() })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn receipts_say_all_of_it() {
+        let all = StudioSettings {
+            studio: Studio::Clay,
+            ground: Some(false),
+            up: Some(UpAxis::Z),
+            smooth_deg: Some(12.5),
+            variant: Some("\"red\"".to_owned()),
+            scene: Some(3),
+            animation: Some("walk".to_owned()),
+            cameras: true,
+        };
+        for settings in [StudioSettings::default(), all] {
+            assert_eq!(StudioSettings::from_json(&settings.to_json()), Some(settings));
+        }
+        for wrong in ["", "x", "3", "{ \"studio\": \"dark\" }", "{ \"light\": true }"] {
+            assert_eq!(StudioSettings::from_json(wrong), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn lights_are_around_the_model_and_turn_with_the_camera() {
+        let stage = Stage { middle: DVec3::new(10.0, 5.0, -3.0), radius: 2.0, lowest: 4.0 };
+        let of = |studio, looked| StudioSettings { studio, ..StudioSettings::default() }.set_up(&stage, looked);
+        for (looked, turned) in [(DVec3::Z, 0.0), (DVec3::X, 90.0), (DVec3::new(0.0, 7.0, -1.0), 180.0)] {
+            let (lights, ground) = of(Studio::Soft, looked);
+            assert_eq!(lights.len(), 3);
+            for (light, lamp) in lights.iter().zip([&KEY, &FILL, &RIM]) {
+                let LightDesc::Rectangle(light) = light else { panic!("is a rectangle") };
+                let towards = DVec3::from(light.center) - stage.middle;
+                assert!((towards.length() - DISTANCE * stage.radius).abs() < 1e-9);
+                let azimuth = pxfm::f_atan2(towards.x, towards.z).to_degrees() - turned - lamp.azimuth_deg;
+                assert!((azimuth / 360.0 - (azimuth / 360.0).round()).abs() < 1e-9, "{azimuth}");
+                // White on a white wall that faces it: L A / d^2 = pi strength, whatever the size of the model
+                let [width, height] = light.size.expect("has one");
+                let arrives = light.strength * width * height / towards.length_squared();
+                assert!((arrives / std::f64::consts::PI - lamp.strength).abs() < 1e-9);
+            }
+            let Some(ShapeDesc::Parallelogram(ground)) = ground else { panic!("has a ground") };
+            assert_eq!((ground.p[1], ground.e0[1], ground.e1[1]), (4.0, 0.0, 0.0));
+            assert!(DVec3::from(ground.e0).cross(DVec3::from(ground.e1)).y > 0.0);
+        }
+        let (lights, ground) = of(Studio::Hard, DVec3::Z);
+        let shadows = lights.iter().map(|light| matches!(light, LightDesc::Directional(light) if light.shadows));
+        assert_eq!(shadows.collect::<Vec<_>>(), [true, false]);
+        assert_eq!(ground, None);
+        assert_eq!(of(Studio::Flat, DVec3::Z), (Vec::new(), None));
+    }
+}
