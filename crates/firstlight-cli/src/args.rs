@@ -410,7 +410,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N|exact", value_parser = samples, help_heading = "Quality")]
     pub samples: Option<SamplesDesc>,
     /// How edges are smoothed: full lights every camera ray, adaptive lights each surface in a pixel once where that is
-    /// enough [default: adaptive]
+    /// enough, multisample always [default: adaptive; multisample of models]
     #[arg(long, value_name = "MODE", help_heading = "Quality")]
     pub aa_mode: Option<AntialiasingMode>,
     /// How far a pixel may be off the converged picture, 0.25 to 16, in steps of an 8-bit picture: 4 is a faster

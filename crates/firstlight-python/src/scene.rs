@@ -379,8 +379,9 @@ impl PyScene {
     ///     Area lights are integrated, or sampled at so many points.
     /// tolerance : float, optional
     ///     How far a pixel may be off the converged picture, in steps of an 8-bit picture.
-    /// aa_mode : {"adaptive", "full"}
-    ///     Whether each surface in a pixel is lit as often as it needs, or each camera ray by itself.
+    /// aa_mode : {"adaptive", "full", "multisample"}
+    ///     Whether each surface in a pixel is lit as often as it needs, each camera ray by itself, or each smooth part of
+    ///     a surface once.
     /// crop : tuple of int, optional
     ///     x, y, width and height of the part to render, in pixels from the upper left corner.
     /// time : float
@@ -420,7 +421,9 @@ impl PyScene {
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyRender> {
         let Some(aa_mode) = AaMode::from_name(aa_mode) else {
-            return Err(PyValueError::new_err(format!("aa_mode is {aa_mode:?}; it is \"adaptive\" or \"full\"")));
+            return Err(PyValueError::new_err(format!(
+                "aa_mode is {aa_mode:?}; it is \"adaptive\", \"full\" or \"multisample\""
+            )));
         };
         let crop = crop.map(|(x, y, width, height)| Window { x, y, width, height });
         let threads = NonZeroUsize::new(threads);

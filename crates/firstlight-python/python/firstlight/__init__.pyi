@@ -293,7 +293,7 @@ class Scene:
         aa: int | None = None,
         samples: Literal["exact"] | int | None = None,
         tolerance: float | None = None,
-        aa_mode: Literal["adaptive", "full"] = "adaptive",
+        aa_mode: Literal["adaptive", "full", "multisample"] = "adaptive",
         crop: tuple[int, int, int, int] | None = None,
         time: float = 0.0,
         motion_to: float | str | Camera | dict[str, Any] | None = None,
