@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::{ModelParts, ModelShape, ModelWarning, MtlSettings, clay, material_name, read_mtl, shown};
+use super::{ModelParts, ModelShape, ModelWarning, MtlSettings, clay, material_name, read_mtl, shown, unique};
 use crate::context::{AssetError, Assets};
 use crate::describe::FilePath;
 use crate::describe::value::join_path;
@@ -38,7 +38,8 @@ pub(crate) struct ShownMesh<'a> {
 pub(crate) fn describe_mesh(data: &MeshData, shown_mesh: &ShownMesh<'_>) -> ModelParts {
     let ShownMesh { file, smooth_deg, unlit, chosen, .. } = *shown_mesh;
     let mut parts = ModelParts::default();
-    let default = material_name(file, "default", unlit);
+    let taken = |name: &str| data.materials.iter().any(|own| material_name(file, own, unlit) == name);
+    let default = unique(material_name(file, "default", unlit), taken);
     let smooth_deg = smooth_deg.or(data.normals.is_empty().then_some(SMOOTH_DEG));
     let mut mesh = MeshDesc { file: Some(FilePath(file.to_owned())), smooth_deg, ..MeshDesc::default() };
     let size = data.used_bounds().map_or(0.0, |[low, high]| (high - low).length());
