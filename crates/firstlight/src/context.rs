@@ -420,6 +420,18 @@ impl CompileContext {
         std::mem::take(&mut self.advice)
     }
 
+    /// Runs `f`, which does once more what was done before, with little added: the memory is that of the second time,
+    /// and what may surprise has been told.
+    pub(crate) fn again<R>(&mut self, f: impl FnOnce(&mut Self) -> R) -> R {
+        let (taken, told, advised) = (std::mem::take(&mut self.taken), self.faults.len(), self.advice.len());
+        let result = f(self);
+        self.taken = self.taken.max(taken);
+        self.advice.truncate(advised);
+        let errors = self.faults.split_off(told).into_iter().filter(|fault| fault.severity == Severity::Error);
+        self.faults.extend(errors);
+        result
+    }
+
     /// Runs `f` with an empty path, for a fault that belongs elsewhere.
     pub(crate) fn outside<R>(&mut self, f: impl FnOnce(&mut Self) -> R) -> R {
         let path = std::mem::take(&mut self.path);

@@ -83,7 +83,7 @@ fn a_folder_stands_for_the_models_in_it() {
 #[test]
 fn a_folder_without_models_is_said_and_the_others_are_rendered() {
     let folder = with_set();
-    let words = "empty: no file in this folder or below ends in .ply, .stl, .obj";
+    let words = "empty: no file in this folder or below ends in .glb, .gltf, .obj, .ply, .stl";
     folder.run("render empty -o out/a.png").exits(1).says(&[words]);
     let run = folder.run(&format!("render empty set/chairs -o out/{{stem}}.png {TINY}")).exits(1);
     run.says(&[words, "2 of 3 scenes were rendered; 1 could not be:\n  empty\n"]);

@@ -118,13 +118,6 @@ const MODEL: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
 fn a_file_of_another_kind_is_one_line_that_says_what_it_is() {
     let folder = Folder::new();
     let files: &[(&str, &[u8], &str)] = &[
-        (
-            "a.gltf",
-            b"{ \"asset\": { \"version\": \"2.0\" }, \"meshes\": [] }\n",
-            "looks like a glTF model, not like a firstlight scene; that kind is not read yet; export it as PLY, STL \
-             or OBJ",
-        ),
-        ("a.glb", b"glTF\x02\0\0\0\x0c\0\0\0", "looks like a binary glTF model (GLB)"),
         ("a.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "looks like a PNG picture"),
         ("a", b"\xff\xd8\xff\xe0", "looks like a JPEG picture"),
         ("a.zip", b"PK\x03\x04\x0a\0", "looks like a zip archive, not like a firstlight scene; unpack it first"),
@@ -158,6 +151,50 @@ fn a_file_of_another_kind_is_one_line_that_says_what_it_is() {
     }
 }
 
+/// A triangle, as glTF.
+const GLTF: &str = r#"{
+  "asset": { "version": "2.0" },
+  "buffers": [{ "uri": "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA", "byteLength": 36 }],
+  "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+  "accessors": [{ "bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3 }],
+  "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }],
+  "nodes": [{ "mesh": 0 }],
+  "scenes": [{ "nodes": [0] }]
+}"#;
+
+#[test]
+fn a_gltf_model_is_one_by_its_name_or_its_content() {
+    let folder = Folder::new();
+    for name in ["a.gltf", "a", "a.ply", "a.toml"] {
+        folder.put(name, GLTF);
+        for command in ["check", "info", "render -o a.png --size 8"] {
+            folder.run(&format!("{command} {name} --strict")).done();
+        }
+        folder.run(&format!("check {name} --variant red")).exits(1).says(&["there is no variant \"red\""]);
+        folder
+            .run(&format!("check {name} --gltf-scene 1"))
+            .exits(1)
+            .says(&["there is no scene 1; the file has 1, counted from 0"]);
+    }
+    folder.run_with_input("check - --strict", GLTF.as_bytes()).done();
+    // Damaged, or nothing
+    folder.put("a.glb", b"glTF\x02\0\0\0\x0c\0\0\0");
+    for command in ["check a.glb", "info a.glb", "render a.glb"] {
+        folder.run(command).exits(1).says(&["error: a.glb: has no JSON chunk; the file is damaged"]);
+    }
+    folder.put("a.gltf", "{ \"asset\": { \"version\": \"2.0\" }, \"meshes\": [] }\n");
+    folder.run("check a.gltf").done().says(&["note: a.gltf: the scene has no shapes"]);
+    folder.run("render a.gltf --size 8 -o b.png").exits(1).says(&["no picture was written"]);
+    // As a mesh of a scene it is told what to do
+    folder.put("scene.toml", format!("{SCENE}[[mesh]]\nfile = \"a.glb\"\n"));
+    folder.run("check scene.toml").exits(1).says(&[
+        "mesh[0].file: a.glb: looks like a binary glTF model (GLB), not like a mesh; give it as a model (.glb, .gltf), \
+         or name it as the file of a [[model]]",
+    ]);
+    folder.put("scene.toml", format!("{SCENE}[[model]]\nfile = \"a.ply\"\n"));
+    folder.run("check scene.toml --strict").done();
+}
+
 #[test]
 fn a_model_is_known_by_its_content() {
     let folder = Folder::new();
@@ -183,19 +220,18 @@ fn a_model_is_spoken_of_by_its_name() {
     let folder = Folder::new();
     std::fs::create_dir(folder.path("models")).unwrap();
     folder.put("models/a.obj", MODEL.replace("f 1", "usemtl clay\nf 1"));
-    // Nothing can be done about it but to write a scene: no fault of the model
-    let named = "note: models/a.obj: names a material that is not described: \"clay\"; ";
-    let own = "their faces have the mesh's own material; a scene describes one as [material.phong.NAME]\n";
-    for command in ["check models/a.obj", "check models/a.obj --strict"] {
-        let ran = folder.run(command).done().says(&[&format!("{named}{own}")]);
-        assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
-    }
+    // A name of a material is no fault of the model, where it names no file of materials either
+    assert_eq!(folder.run("check models/a.obj --strict").done().stderr, "");
     folder.put("models/a.obj", format!("mtllib a.mtl\n{}", MODEL.replace("f 1", "usemtl clay\nf 1")));
+    let missing = "models/a.obj: \"a.mtl\": there is no such file of materials; its faces are of a light gray; an OBJ \
+                   file needs its MTL files beside it\n";
+    folder.run("check models/a.obj").done().says(&[&format!("warning: {missing}")]);
+    folder.run("check models/a.obj --strict").exits(1).says(&[&format!("error: {missing}")]);
     folder.put("models/a.mtl", "newmtl clay\nKd 1 0 0\n");
-    for command in ["check models/a.obj", "check models/a.obj --strict"] {
-        let ran = folder.run(command).done().says(&[&format!("{named}.mtl files are not read: {own}")]);
-        assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
-    }
+    assert_eq!(folder.run("check models/a.obj --strict").done().stderr, "");
+    // And it is red
+    folder.run("render models/a.obj --studio flat --view front --size 8 --aa 1 -o red.png").done();
+    assert_eq!(Picture::decode(&folder.get("red.png")).part(4, 4, 1, 1), [255, 0, 0]);
     folder.put("models/a.obj", "v 0 0 0\nv 1 1 1\nv 2 2 z\n");
     folder.run("check models/a.obj").exits(1).says(&["error: models/a.obj:3: v: `z`"]);
     folder.put("models/a.obj", "v 0 0 0\n".repeat(3) + "f 1 2 3\n");

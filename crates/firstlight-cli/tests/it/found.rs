@@ -89,9 +89,15 @@ fn what_nothing_covers_is_as_asked() {
         let picture = Picture::decode(&folder.get("a.png"));
         picture.part(0, 0, 1, 1)
     };
-    assert_eq!(corner("--background #204060"), [0x20, 0x40, 0x60]);
-    assert_eq!(corner("--background 1,0,0.5"), [255, 0, 188]);
-    assert_eq!(corner("--transparent"), [0, 0, 0, 0]);
+    assert_eq!(corner("--studio flat --background #204060"), [0x20, 0x40, 0x60]);
+    assert_eq!(corner("--studio flat --background 1,0,0.5"), [255, 0, 188]);
+    assert_eq!(corner("--studio flat --transparent"), [0, 0, 0, 0]);
+    // The studio's own, and others, as its display shows them
+    let neutral = firstlight::Display { tone_mapping: firstlight::ToneMapping::Neutral, ..Default::default() };
+    let shown = |color: [f64; 3]| neutral.encode_color(color.map(|c| c as f32)).map(|c| (255.0 * c).round() as u8);
+    assert_eq!(corner("--ground off"), shown([0.78; 3]));
+    assert_eq!(corner("--ground off --background 1,0,0.5"), shown([1.0, 0.0, 0.5]));
+    assert_eq!(corner("--ground off --transparent"), [0, 0, 0, 0]);
     // In place of what the scene says
     folder.put(
         "scene.toml",

@@ -445,8 +445,8 @@ fn the_kind_of_a_file_is_found() {
     assert_eq!(of("a.bin", b"glTF"), None);
     assert_eq!(
         try_read("a.bin", b"glTF").unwrap_err().to_string(),
-        "a.bin: looks like a binary glTF model (GLB), not like a mesh; that kind is not read yet; export it as PLY, \
-         STL or OBJ"
+        "a.bin: looks like a binary glTF model (GLB), not like a mesh; give it as a model (.glb, .gltf), or name it as \
+         the file of a [[model]]"
     );
 }
 

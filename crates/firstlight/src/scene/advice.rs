@@ -637,15 +637,22 @@ mod tests {
         );
         assert_eq!(
             of("glTF\u{2}\0\0\0"),
-            ["folder/a.obj: looks like a binary glTF model (GLB), not like a mesh; give it as a model (.glb, \
-                 .gltf), or name it as the file of a [[model]]"]
+            ["folder/a.obj: looks like a binary glTF model (GLB), not like a mesh; give it as a model (.glb, .gltf), \
+                 or name it as the file of a [[model]]"]
         );
         let many: String = (0..9).map(|i| format!("usemtl m{i}\nf 1 2 3\n")).collect();
+        let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+        assert_eq!(of(&format!("{corners}{many}")), [""; 0], "without an MTL file nothing is amiss");
         assert_eq!(
-            of(&format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl {}\nf 1 2 3\n{many}", "x".repeat(100))),
-            ["folder/a.obj: names materials that are not described: \"xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx...\", \
-              \"m0\", \"m1\", \"m2\", \"m3\", \"m4\" and 4 more; their faces have the mesh's own material; a scene \
-              describes one as [material.phong.NAME]"]
+            of(&format!("mtllib a.mtl\n{corners}{many}")),
+            [
+                "folder/a.obj: \"a.mtl\": there is no such file of materials; its faces are of a light gray; an OBJ \
+                 file needs its MTL files beside it",
+                "folder/a.obj: 9 of its materials are described in no MTL file, \"m0\" for one; their faces are of a \
+                 light gray"
+            ]
         );
+        // What is compiled twice, with the ground, is told once
+        assert_eq!(of("v 0 0 0 255 0 0\nv 1 0 0 0 9 0\nv 0 1 0 0 0 9\nf 1 2 3\n").len(), 1);
     }
 }

@@ -150,7 +150,7 @@ impl SceneDesc {
             Some(ground) => {
                 shapes.to_mut().shapes.push(ground.clone());
                 files.read.clear();
-                compile_shapes(&shapes, &materials, false, cx, assets, &mut files)
+                cx.again(|cx| compile_shapes(&shapes, &materials, false, cx, assets, &mut files))
             }
             None => geometry,
         };
