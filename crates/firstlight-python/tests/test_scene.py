@@ -1,6 +1,7 @@
 """Scenes that are built, changed, asked and pickled; cameras."""
 
 import itertools
+import json
 import pickle
 import pydoc
 import warnings
@@ -482,3 +483,25 @@ def test_advice_is_given_once():
     assert warned(lambda: other.render(buffers=["depth", "crypto-object"], **SMALL)) == []
     (warning,) = warned(lambda: other.render(camera={"position": [0, 3, 9], "look_at": [0, 3, 10]}, **SMALL))[1:]
     assert "nothing is in the picture" in str(warning.message)
+
+
+def test_a_model_is_a_shape_with_parts(tmp_path):
+    corners = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"
+    gltf = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"uri": "data:;base64," + corners, "byteLength": 36}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3}],
+        "materials": [{"name": "oak"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+        "nodes": [{"name": "seat", "mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+    }
+    (tmp_path / "chair.gltf").write_text(json.dumps(gltf))
+    (tmp_path / "scene.toml").write_text("[camera]\nposition = [0.3, 0.3, 3]\nlook_at = [0.3, 0.3, 0]\n")
+    scene = fl.Scene.from_file(tmp_path / "scene.toml")
+    scene.add_unlit_material("red", color=[1, 0, 0])
+    scene.add_model(name="chair", file="chair.gltf", materials={"oak": "red"})
+    frame = scene.render(buffers=["color", "object-id"], width=9, height=9, aa=1)
+    assert list(frame["color"][4, 4]) == [1, 0, 0, 1]
+    assert frame.object_names == ["chair/seat"]

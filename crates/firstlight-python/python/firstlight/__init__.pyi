@@ -332,6 +332,13 @@ class Scene:
         **fields: Unpack[_MeshFields],
     ) -> Handle: ...
     def add_camera(self, camera: Camera | None = None, *, name: str = "", **fields: Any) -> Handle: ...
+    def add_shadow_catcher_material(
+        self,
+        name: str,
+        *,
+        alpha: float = ...,
+        single_sided: bool = ...,
+    ) -> Handle: ...
     def add_checkerboard_texture(
         self,
         name: str,
@@ -497,6 +504,22 @@ class Scene:
         self,
         *,
         of: str,
+        **fields: Unpack[_ShapeFields],
+    ) -> Handle: ...
+    def add_model(
+        self,
+        *,
+        file: str,
+        up: Literal["y", "z"] | None = ...,
+        materials: Mapping[str, str] = ...,
+        variant: str | None = ...,
+        scene: int | None = ...,
+        animation: str | None = ...,
+        time: float | None = ...,
+        lights: bool = ...,
+        cameras: bool = ...,
+        smooth_deg: float | None = ...,
+        unlit: bool = ...,
         **fields: Unpack[_ShapeFields],
     ) -> Handle: ...
     def add_point_light(
