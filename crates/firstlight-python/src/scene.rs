@@ -497,6 +497,11 @@ impl PyScene {
                     None => drop(state.files.read(&file.0, u64::MAX)),
                 }
             }
+            // What models name themselves is read with their parts
+            if let Ok(mut parts) = state.parsed.desc.without_models(&state.files, 0.0) {
+                let pictures = parts.files_mut().filter(|file| !file.0.contains('#'));
+                pictures.for_each(|file| drop(state.files.read(&file.0, u64::MAX)));
+            }
             (state.parsed.desc.to_json(), state.files.all(), meshes)
         });
         let (by_name, of_meshes) = (PyDict::new(py), PyDict::new(py));
