@@ -150,8 +150,8 @@ Examples:
 #[derive(Args, Debug)]
 pub struct SceneArgs {
     /// A scene file (.toml, .json, or a course file .txt), a model (.glb, .gltf, .obj, .ply, .stl), the name of a
-    /// built-in scene such as config23 (see `firstlight scenes`; a file of such a name is ./config23), or - for standard
-    /// input, a scene or a model
+    /// built-in scene such as config23 (see `firstlight scenes`; a file of such a name is ./config23), or - for
+    /// standard input, a scene or a model
     #[arg(value_name = "SCENE", value_hint = ValueHint::FilePath)]
     pub scene: PathBuf,
     #[command(flatten)]
@@ -283,10 +283,10 @@ fn angle(text: &str) -> Result<f64, String> {
 #[derive(Args, Debug)]
 pub struct RenderArgs {
     /// A scene file (.toml, .json, or a course file .txt), a model (.glb, .gltf, .obj, .ply, .stl), the name of a
-    /// built-in scene such as config23 (see `firstlight scenes`; a file of such a name is ./config23), or - for standard
-    /// input, a scene or a model. A folder stands for the models in it and in the folders below, sorted by their paths,
-    /// without hidden ones and what lies behind links to folders. Several are rendered one after the other, also after
-    /// one that failed
+    /// built-in scene such as config23 (see `firstlight scenes`; a file of such a name is ./config23), or - for
+    /// standard input, a scene or a model. A folder stands for the models in it and in the folders below, sorted by
+    /// their paths, without hidden ones and what lies behind links to folders. Several are rendered one after the
+    /// other, also after one that failed
     #[arg(value_name = "SCENE", value_hint = ValueHint::FilePath, default_value = "config11")]
     pub scenes: Vec<PathBuf>,
     #[command(flatten)]
