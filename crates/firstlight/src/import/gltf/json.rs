@@ -100,7 +100,7 @@ impl<'a> JsonPlace<'a> {
         // Exporters of scripting languages write 3.0
         let whole = self.value.as_u64().or_else(|| {
             let number = self.value.as_f64()?;
-            (number >= 0.0 && number <= 9e15 && number.fract() == 0.0).then_some(number as u64)
+            ((0.0..=9e15).contains(&number) && number.fract() == 0.0).then_some(number as u64)
         });
         let whole = whole.and_then(|number| usize::try_from(number).ok());
         whole.ok_or_else(|| self.wrong_type("a whole number from 0 on"))

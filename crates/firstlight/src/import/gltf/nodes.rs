@@ -93,7 +93,9 @@ impl Gltf {
             0 => {
                 let mut has_parent = vec![false; list.len()];
                 for child in list.iter().map(|node| node.list("children")).collect::<Result<Vec<_>, _>>()?.concat() {
-                    has_parent.get_mut(child.index()?).map(|has| *has = true);
+                    if let Some(has) = has_parent.get_mut(child.index()?) {
+                        *has = true;
+                    }
                 }
                 (0..list.len()).filter(|i| !has_parent[*i]).collect()
             }
