@@ -159,7 +159,7 @@ fn the_text_of_a_completed_scene_means_the_same_bits() {
     let text = folder.run(&format!("render models/tetra.ply {options} --print-scene")).done().text();
     assert!(text.contains("file = \"models/tetra.ply\"") && text.contains("[camera]"), "{text}");
     assert_eq!(text.matches("[[light.rectangle]]").count(), 3, "{text}");
-    for part in ["[[model]]", "name = \"ground\"", "display = \"neutral\"", "background = [0.1, 0.2, 0.3]"] {
+    for part in ["[[mesh]]", "name = \"ground\"", "display = \"neutral\"", "background = [0.1, 0.2, 0.3]"] {
         assert!(text.contains(part), "{part}: {text}");
     }
     folder.put("all.toml", &text);

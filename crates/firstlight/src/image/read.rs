@@ -152,7 +152,7 @@ fn jpeg_header(bytes: &[u8], limits: &Limits) -> Result<PictureHeader, ImageErro
     let damaged = |reason: String| ImageError::Damaged { format: "JPEG", reason };
     damage::in_jpeg(bytes).map_err(damaged)?;
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), jpeg_options());
-    decoder.decode_headers().map_err(|e: DecodeErrors| damaged(e.to_string()))?;
+    decoder.decode_headers().map_err(|e: DecodeErrors| damaged(e.to_string().trim_end().to_owned()))?;
     let info = decoder.info().ok_or_else(|| damaged("it has no header".into()))?;
     let (width, height) = (u32::from(info.width), u32::from(info.height));
     check_size(width, height, limits)?;
@@ -209,7 +209,7 @@ fn decode_png(bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError> {
 
 fn decode_jpeg(bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError> {
     let damaged = |reason: String| ImageError::Damaged { format: "JPEG", reason };
-    let fault = |e: DecodeErrors| damaged(e.to_string());
+    let fault = |e: DecodeErrors| damaged(e.to_string().trim_end().to_owned());
     let PictureHeader { width, height, .. } = jpeg_header(bytes, limits)?;
     if u64::from(width) * u64::from(height) > 16 * 16 * 8 * bytes.len() as u64 {
         return Err(damaged(SHORT.into()));
