@@ -498,7 +498,7 @@ impl PyScene {
                 }
             }
             // What models name themselves is read with their parts
-            if let Ok(mut parts) = state.parsed.desc.without_models(&state.files, 0.0) {
+            if let Ok(mut parts) = state.parsed.desc.without_models(&*state.files, 0.0) {
                 let pictures = parts.files_mut().filter(|file| !file.0.contains('#'));
                 pictures.for_each(|file| drop(state.files.read(&file.0, u64::MAX)));
             }
