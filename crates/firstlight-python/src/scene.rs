@@ -380,8 +380,8 @@ impl PyScene {
     /// tolerance : float, optional
     ///     How far a pixel may be off the converged picture, in steps of an 8-bit picture.
     /// aa_mode : {"adaptive", "full", "multisample"}
-    ///     Whether each surface in a pixel is lit as often as it needs, each camera ray by itself, or each smooth part of
-    ///     a surface once.
+    ///     Whether each surface in a pixel is lit as often as it needs, each camera ray by itself, or each smooth part
+    ///     of a surface once.
     /// crop : tuple of int, optional
     ///     x, y, width and height of the part to render, in pixels from the upper left corner.
     /// time : float

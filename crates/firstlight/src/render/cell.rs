@@ -116,7 +116,7 @@ pub(crate) struct CellRenderer<'a> {
     rays: Vec<Ray>,
     ray_points: Vec<RayPoint>,
     /// The rays of a pixel of which one stands for others, under multisampling.
-    samples: Vec<primary::Sample>,
+    samples: Vec<primary::CameraSample>,
     /// The layers of one ray.
     stack: LayerStack,
     hits: PixelHits,

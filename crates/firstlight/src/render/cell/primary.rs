@@ -29,12 +29,9 @@ const TEXTURED: u32 = 8;
 /// The most lobes of such a square: each has nodes of its own.
 const LOBES: usize = 4;
 
-/// Under multisampling: the cosine of the angle between shading normals beyond which parts of a surface are lit apart.
-const CREASE: f32 = 0.97;
-
 /// The hit of a camera ray, before anything is looked up there.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sample {
+pub(super) struct CameraSample {
     /// The number of the ray in its pixel.
     k: u32,
     seen: (Option<VisibleShape>, Hit),
@@ -44,33 +41,33 @@ pub(super) struct Sample {
     normals: [Vec3; 2],
 }
 
-impl Sample {
+impl CameraSample {
     fn new(scene: &Scene, k: u32, ray: &Ray, seen: (Option<VisibleShape>, Hit)) -> Self {
         let (geometry, hit) = (&scene.geometry, &seen.1);
         let material = geometry.surfaces[hit.surface.index()].material;
         let material = material.is_none().then(|| geometry.face_material(hit));
         // Shapes that are no meshes are one part each
         let normals = if seen.0.is_some() { [Vec3::ZERO; 2] } else { geometry.normals(ray, hit) };
-        Sample { k, seen, material, p: ray.o + ray.d * hit.t as f32, normals }
+        CameraSample { k, seen, material, p: ray.o + ray.d * hit.t as f32, normals }
     }
 
     /// Whether one point may stand for both: they are on one surface of one material, without a crease or a gap.
-    fn is_near(&self, other: &Sample) -> bool {
+    fn is_near(&self, other: &CameraSample) -> bool {
         let ((shape, hit), (other_shape, other_hit)) = (&self.seen, &other.seen);
         if hit.surface != other_hit.surface || shape != other_shape || self.material != other.material {
             return false;
         }
         let apart = other.p - self.p;
         let off = apart.dot(self.normals[0]).abs().max(apart.dot(other.normals[0]).abs());
-        shape.is_some() || self.normals[1].dot(other.normals[1]) > CREASE && off <= 0.5 * apart.length()
+        shape.is_some() || self.normals[1].dot(other.normals[1]) > TOLERANCE.crease && off <= 0.5 * apart.length()
     }
 
     /// Takes a part of a surface out of the samples of a pixel of `n` x `n` rays: the sample nearest to the middle of
     /// the part, and the number of all that it stands for. `None` if none are left.
-    fn take_part(samples: &mut Vec<Sample>, n: u32) -> Option<(Sample, u32)> {
+    fn take_part(samples: &mut Vec<CameraSample>, n: u32) -> Option<(CameraSample, u32)> {
         let first = *samples.first()?;
-        let place = |sample: &Sample| Vec2::new((sample.k % n) as f32, (sample.k / n) as f32);
-        let (mut part, mut sum) = (ArrayVec::<Sample, MOST_SAMPLES>::new(), Vec2::ZERO);
+        let place = |sample: &CameraSample| Vec2::new((sample.k % n) as f32, (sample.k / n) as f32);
+        let (mut part, mut sum) = (ArrayVec::<CameraSample, MOST_SAMPLES>::new(), Vec2::ZERO);
         samples.retain(|sample| {
             let is_near = !part.is_full() && first.is_near(sample);
             if is_near {
@@ -80,7 +77,7 @@ impl Sample {
             !is_near
         });
         let middle = sum / part.len() as f32;
-        let off = |sample: &Sample| (place(sample) - middle).length_squared();
+        let off = |sample: &CameraSample| (place(sample) - middle).length_squared();
         let nearest = part.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
         Some((*nearest, part.len() as u32))
     }
@@ -227,15 +224,15 @@ impl CellRenderer<'_> {
                 continue;
             }
             if self.mode == AaMode::Multisample && !is_past_layers {
-                samples.push(Sample::new(scene, k, ray, (shape, hit)));
+                samples.push(CameraSample::new(scene, k, ray, (shape, hit)));
                 continue;
             }
             let of = (ray, differential(), at, 1, left);
             self.add_point(&mut pixel, (shape, hit), of, &mut points);
         }
         // One of each smooth part of a surface is looked up, over the footprint of the pixel
-        while let Some((chosen, count)) = Sample::take_part(&mut samples, n) {
-            let Sample { k, seen, .. } = chosen;
+        while let Some((chosen, count)) = CameraSample::take_part(&mut samples, n) {
+            let CameraSample { k, seen, .. } = chosen;
             let [x, y] = [k % n, k / n];
             let place = |corner: u32, at: u32| corner as f32 + (at as f32 + 0.5) / n as f32;
             let differential = match scene.needs_differentials() {
