@@ -63,9 +63,6 @@ pub(crate) struct Tolerance {
     /// The length of a difference of unit normals: their deviation from linear variation or from their mean. Beyond it
     /// there is a crease.
     pub even: f32,
-    /// Under multisampling, a cosine: parts of a surface in a pixel whose shading normals are farther apart are lit
-    /// apart. Edges between facets of a low-polygon ball show steps from some 20 degrees on.
-    pub crease: f32,
     /// A part of the colour: the deviation from their mean of colours that are replaced by it; and of a highlight in a
     /// pixel of a block whose lobe has another width.
     pub same_mean: f32,
@@ -145,7 +142,6 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     quadrant_bend: 3.0,
     color_light_covariance: 0.4,
     even: 0.01,
-    crease: 0.97,
     same_mean: 0.004,
     same_lobe: 0.08,
     half_of_rays: 16.0,

@@ -59,7 +59,9 @@ impl CameraSample {
         }
         let apart = other.p - self.p;
         let off = apart.dot(self.normals[0]).abs().max(apart.dot(other.normals[0]).abs());
-        shape.is_some() || self.normals[1].dot(other.normals[1]) > TOLERANCE.crease && off <= 0.5 * apart.length()
+        // Shading normals within 14 degrees
+        let turn = self.normals[1] - other.normals[1];
+        shape.is_some() || turn.length_squared() < 0.0625 && off <= 0.5 * apart.length()
     }
 
     /// Takes a part of a surface out of the samples of a pixel of `n` x `n` rays: the sample nearest to the middle of
