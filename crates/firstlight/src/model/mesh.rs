@@ -57,9 +57,14 @@ pub(crate) fn describe_mesh(data: &MeshData, shown_mesh: &ShownMesh<'_>) -> Mode
         parts.warnings.push(ModelWarning { message, hint: "their faces are of a light gray".to_owned() });
     }
     mesh.material = Some(default.clone());
-    parts.materials.push((default, shown(clay(!data.colors.is_empty()), unlit)));
+    parts.materials.push((default, shown(clay(has_colors(data)), unlit)));
     parts.shapes.push(ModelShape { shape: ShapeDesc::Mesh(mesh), model_from_shape: DAffine3::IDENTITY });
     parts
+}
+
+/// Whether vertices have colours: white is what those without have.
+fn has_colors(data: &MeshData) -> bool {
+    data.colors.iter().any(|[r, g, b, _]| [*r, *g, *b] != [1.0; 3])
 }
 
 /// Adds the materials of the MTL files that faces of the mesh have; the answer are their names in the file.
