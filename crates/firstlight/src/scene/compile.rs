@@ -116,8 +116,9 @@ impl SceneDesc {
         cx.memory = options.memory;
         cx.between("time", time, -MAX_TIME, MAX_TIME, Some("the moment to compile, in seconds"));
         // Put the parts of models in place of them; what lies within their files is a file from here on
-        let mut files = MeshFiles { cache, ..MeshFiles::default() };
-        let said = self.with_models(cx, assets, &mut files);
+        let files = MeshFiles { cache, ..MeshFiles::default() };
+        // Which files decide the picture is told by its parts
+        let said = self.with_models(cx, assets, &mut files.again());
         let open = files.open.clone();
         let assets = &WithContained { assets, files: &open.gltf };
         said.compile_said(cx, assets, options, files, self)

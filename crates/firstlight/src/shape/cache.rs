@@ -129,7 +129,8 @@ impl<'a> MeshFiles<'a> {
 #[derive(Debug, Default)]
 pub(crate) struct OpenFiles {
     pub gltf: GltfFiles,
-    meshes: Mutex<HashMap<String, LoadedMesh>>,
+    /// With the BLAKE3 of each file.
+    meshes: Mutex<HashMap<String, (LoadedMesh, ContentKey)>>,
 }
 
 /// A mesh of a file, and its key where something is kept.
@@ -137,13 +138,13 @@ pub(crate) type LoadedMesh = (Arc<MeshData>, Option<ContentKey>);
 
 impl OpenFiles {
     /// The mesh of a file that was read before.
-    pub fn mesh(&self, file: &str) -> Option<LoadedMesh> {
+    pub fn mesh(&self, file: &str) -> Option<(LoadedMesh, ContentKey)> {
         self.meshes.lock().unwrap_or_else(PoisonError::into_inner).get(file).cloned()
     }
 
     /// Keeps the mesh of a file.
-    pub fn keep(&self, file: &str, mesh: &LoadedMesh) {
-        self.meshes.lock().unwrap_or_else(PoisonError::into_inner).insert(file.to_owned(), mesh.clone());
+    pub fn keep(&self, file: &str, mesh: &LoadedMesh, hash: ContentKey) {
+        self.meshes.lock().unwrap_or_else(PoisonError::into_inner).insert(file.to_owned(), (mesh.clone(), hash));
     }
 }
 

@@ -140,7 +140,8 @@ pub(crate) fn load_mesh_file(
     if let Some((container, Contained::Mesh(address))) = Contained::split(&file.0) {
         return load_contained(cx, assets, file, (container, &address), files);
     }
-    if let Some(loaded) = files.open.mesh(&file.0) {
+    if let Some((loaded, hash)) = files.open.mesh(&file.0) {
+        files.read.push((file.0.clone(), hash));
         return Some(loaded);
     }
     let (bytes, hash) = read_mesh_bytes(cx, assets, file, files)?;
@@ -152,7 +153,7 @@ pub(crate) fn load_mesh_file(
         Some(data)
     })?;
     let loaded = (data, key);
-    files.open.keep(&file.0, &loaded);
+    files.open.keep(&file.0, &loaded, hash);
     Some(loaded)
 }
 
