@@ -208,9 +208,9 @@ fn is_model(scene: &Path) -> bool {
     ending.is_some_and(|ending| MODEL_ENDINGS.contains(&&*ending))
 }
 
-/// The scenes that are meant: as they are given, and in the place of a folder the models in it and in the folders below
-/// it, in the order of the bytes of their paths. Names that begin with a dot are left out, and links to folders are not
-/// followed. A folder stays where there are none, or where it cannot be read: that is told when it is its turn.
+/// The scenes of the command line, with each folder replaced by the models in it and in the folders below it, sorted by
+/// the bytes of their paths. Files and folders whose names begin with a dot are skipped, and links to folders are not
+/// followed. A folder that holds no model, or that cannot be read, is kept in the list: rendering it reports the error.
 pub fn with_folders(scenes: &[PathBuf]) -> Vec<PathBuf> {
     let is_folder = |scene: &PathBuf| file_of(scene).is_some_and(Path::is_dir);
     scenes.iter().flat_map(|scene| if is_folder(scene) { models_in(scene) } else { vec![scene.clone()] }).collect()

@@ -7,7 +7,7 @@ use firstlight::{Film, Plane, PlaneNumbers, Scene};
 
 use crate::report::Failure;
 
-/// Camera rays along a side of the picture that are asked, at most: a few seconds.
+/// The largest number of camera rays along each side of the picture that the search traces, which takes a few seconds.
 const MOST_RAYS: u64 = 4096;
 
 /// Whether no camera ray meets anything.
@@ -37,7 +37,7 @@ fn outwards(count: u64) -> impl Iterator<Item = u64> {
     (0..count.div_ceil(2)).flat_map(pair).flatten()
 }
 
-/// What is wrong, and what to do.
+/// The error of a model that no camera ray hits, with a hint.
 pub(super) fn failure(name: &str, scene: &Scene) -> Failure {
     let summary = scene.summary();
     let why = match summary.triangles + summary.points {

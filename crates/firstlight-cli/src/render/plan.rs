@@ -513,7 +513,7 @@ pub(super) struct Joined {
     pub sizes: Vec<(u32, u32)>,
 }
 
-/// The pictures that are asked for of each scene.
+/// The frames, views and sizes in which each scene is rendered, from the options.
 fn pictures_of(args: &RenderArgs) -> Result<Pictures, Failure> {
     let twice = |option: &str, what: String| {
         Failure::Usage(format!("{option} names {what} twice; each is a picture of its own, name it once"))
@@ -533,7 +533,10 @@ fn pictures_of(args: &RenderArgs) -> Result<Pictures, Failure> {
     Ok(Pictures { frames: args.frames, views, sizes: args.size.clone() })
 }
 
-/// Sees that a picture is not too large and holds what is asked of it.
+/// Checks that the crop lies inside the picture, and that the picture has no more pixels than the limit.
+///
+/// # Errors
+/// The option and the limit.
 fn check_size(crop: Option<Window>, width: u32, height: u32) -> Result<(), Failure> {
     if let Some(crop) = crop
         && !inside(crop, width, height)

@@ -21,7 +21,7 @@ fn stl(scale: f32) -> Vec<u8> {
     bytes
 }
 
-/// `set/` with models on two levels, what is no model, and what is hidden.
+/// A folder `set/` that holds models in subfolders, a text file, and models in hidden files and folders.
 fn with_set() -> Folder {
     let folder = Folder::new();
     for name in ["set/chairs", "set/tables/old", "set/.cache", "empty/deep", "out"] {
