@@ -48,6 +48,7 @@ impl Gltf {
     /// What the animation says at the moment, node by node.
     pub(super) fn animate(&self, pose: &Pose, nodes: &mut [AnimatedNode]) -> Result<(), GltfFault> {
         let animation = self.root().nth("animations", pose.animation)?;
+        let samplers = animation.list("samplers")?;
         for channel in animation.list("channels")? {
             let target = channel.need("target")?;
             // A channel without a node is that of an extension
@@ -56,10 +57,9 @@ impl Gltf {
             let Some(node) = nodes.get_mut(node.index()?) else {
                 return Err(node.fault(format!("there is no such node; there are {count}")));
             };
-            let sampler = animation.list("samplers")?;
             let wanted = channel.need("sampler")?;
-            let Some(sampler) = sampler.get(wanted.index()?) else {
-                return Err(wanted.fault(format!("there is no such sampler; there are {}", sampler.len())));
+            let Some(sampler) = samplers.get(wanted.index()?) else {
+                return Err(wanted.fault(format!("there is no such sampler; there are {}", samplers.len())));
             };
             let sampled = |width: Option<usize>| self.sample(sampler, pose.time, width);
             match target.need("path")?.text()? {

@@ -76,7 +76,7 @@ impl Gltf {
             MeshAddress::Mesh(mesh) => (*mesh, None, None),
             MeshAddress::Node(node, pose) => {
                 let at = root.nth("nodes", *node)?;
-                let nodes = self.nodes(pose.as_ref())?;
+                let nodes = self.posed_nodes(pose.as_ref())?;
                 let bones = at.get("skin").map(|skin| self.bones(&skin, &nodes)).transpose()?;
                 (at.need("mesh")?.index()?, nodes[*node].weights.clone(), bones)
             }

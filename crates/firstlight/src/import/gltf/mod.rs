@@ -26,8 +26,8 @@ mod nodes;
 #[cfg(test)]
 mod tests;
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::Value;
 
@@ -75,7 +75,12 @@ pub(crate) struct Gltf {
     pub hash: [u8; 32],
     /// Bytes that may still be taken.
     budget: AtomicU64,
+    /// The nodes of the last pose: each of many meshes with a skin asks for them.
+    posed: Mutex<Option<PosedNodes>>,
 }
+
+/// A pose, and all nodes in it.
+type PosedNodes = (Option<Pose>, Arc<Vec<GltfNode>>);
 
 /// How a file is had: its path, as scenes name files, and the most bytes.
 pub(crate) type ReadFile<'a> = dyn Fn(&str, u64) -> Result<Vec<u8>, AssetError> + 'a;
@@ -103,7 +108,7 @@ impl Gltf {
             buffers.push(buffer.map(Arc::new));
         }
         let budget = AtomicU64::new(BUDGET.saturating_add(length.saturating_mul(BUDGET_TIMES)));
-        Ok(Gltf { json, buffers, folder, hash: *hasher.finalize().as_bytes(), budget })
+        Ok(Gltf { json, buffers, folder, hash: *hasher.finalize().as_bytes(), budget, posed: Mutex::default() })
     }
 
     /// Its JSON.
@@ -115,6 +120,19 @@ impl Gltf {
     pub fn material_names(&self) -> Vec<String> {
         let materials = self.root().list("materials").unwrap_or_default();
         materials.iter().filter_map(|material| material.text_of("name")).map(str::to_owned).collect()
+    }
+
+    /// As [`nodes`](Self::nodes), computed once for a pose.
+    fn posed_nodes(&self, pose: Option<&Pose>) -> Result<Arc<Vec<GltfNode>>, GltfFault> {
+        let mut posed = self.posed.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*posed {
+            Some((known, nodes)) if known.as_ref() == pose => Ok(nodes.clone()),
+            _ => {
+                let nodes = Arc::new(self.nodes(pose)?);
+                *posed = Some((pose.copied(), nodes.clone()));
+                Ok(nodes)
+            }
+        }
     }
 
     /// The folder of the file, as the scene names it.
