@@ -249,7 +249,7 @@ fn of_two_surfaces_in_one_plane_neither_shadows_the_other() {
                 // Every pair under half of the lights, over the three poses
                 let of = random.pick(&lights);
                 let text = [
-                    camera_at(pose, [0.0, 3.0, 0.01], [0.0, 0.0, 0.0], 8),
+                    camera_at(pose, [0.0, 3.0, 0.01], [0.0, 0.0, 0.0], 6),
                     flat(floor, pose, [0.2, 0.1], 0.0, 1.0, 1.5, SHADOWS, 0),
                     flat(coin, pose, [0.0; 2], 0.0, 1.0, 0.6, SHADOWS, 1),
                     light(of, pose, [1.0, 2.0], 2.5, 0.3, ""),
@@ -265,7 +265,7 @@ fn the_visibility_of_a_light_in_its_wall_is_1() {
     let buffers = [LightPart::Visibility, LightPart::Unshadowed].map(|part| Buffer::Light(LightId(0), Some(part)));
     for kind in KINDS {
         let text = [
-            camera_at(&Pose::HERE, [0.0, 1.0, 6.0], [0.0, -0.6, 0.0], 40),
+            camera_at(&Pose::HERE, [0.0, 1.0, 6.0], [0.0, -0.6, 0.0], 28),
             flat("parallelogram", &Pose::HERE, [0.0; 2], -1.0, 1.0, 15.0, "", 0),
             flat(kind, &Pose::HERE, [0.0; 2], 2.0, -1.0, 2.0, "", 1),
             light("rectangle", &Pose::HERE, [0.0; 2], 2.0, 0.5, ""),
@@ -282,7 +282,7 @@ fn the_visibility_of_a_light_in_its_wall_is_1() {
             let arrives = floats(&film, buffers[1]).chunks(3).map(|rgb| rgb[1]);
             let lit = floats(&film, buffers[0]).iter().zip(arrives).filter(|(_, arrives)| *arrives > 0.1);
             let least = lit.clone().fold(1.0f32, |least, (seen, _)| least.min(*seen));
-            assert!(lit.count() > 200, "{kind}, {how}: it is dark");
+            assert!(lit.count() > 100, "{kind}, {how}: it is dark");
             assert!(least >= 1.0 - allowed, "{kind}, {how}: {least}");
         }
     }
@@ -381,7 +381,7 @@ fn renderers_agree_right_below_the_plane_of_a_light() {
     let random = &mut Random::new(5);
     for (count, depth) in [(8, 1e-4), (60, 1e-4), (60, 1e-5), (60, 1e-2)] {
         let pose = &Pose::HERE;
-        let mut text = camera_at(pose, [0.0, 4.0, 0.01], [0.0, 2.0, 0.0], 24);
+        let mut text = camera_at(pose, [0.0, 4.0, 0.01], [0.0, 2.0, 0.0], 16);
         text += &flat("parallelogram", pose, [0.0; 2], 2.0 - depth, 1.0, 3.0, "", 0);
         for _ in 0..count {
             let [x, y, z] = random.vector(1.0);

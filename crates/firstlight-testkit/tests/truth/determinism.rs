@@ -70,12 +70,10 @@ fn threads_and_tiles_do_not_matter() {
         let scene = compile(&desc);
         for one in [adaptive(), every_ray()] {
             let expected = with(one.clone(), &scene);
-            for threads in [1, 2, 8] {
-                for tile_size in [8, 16, 23, 64] {
-                    let threads = NonZeroUsize::new(threads);
-                    let got = with(RenderSettings { threads, tile_size, ..one.clone() }, &scene);
-                    assert!(got == expected, "{threads:?} threads, tiles of {tile_size}: {desc:#?}");
-                }
+            for (threads, tile_size) in [(1, 23), (2, 8), (2, 64), (8, 16)] {
+                let threads = NonZeroUsize::new(threads);
+                let got = with(RenderSettings { threads, tile_size, ..one.clone() }, &scene);
+                assert!(got == expected, "{threads:?} threads, tiles of {tile_size}: {desc:#?}");
             }
             let all = RenderSettings { threads: None, ..one };
             assert!(with(all, &scene) == expected, "all threads: {desc:#?}");

@@ -284,7 +284,7 @@ fn what_has_no_hollows_never_shadows_itself() {
             // No coordinate may pass 2.5e8
             let middle = mul(random.direction(), f64::min(size * far, 1e8));
             for (name, shape, group) in convex(size) {
-                for _ in 0..times(4).min(400) {
+                for _ in 0..times(2).min(400) {
                     // Outside of it: who is inside a thing sees its shadowed side
                     let mut above = |up: f64| {
                         let way = unit(add(random.direction(), [0.0, up, 0.0]));
@@ -317,7 +317,7 @@ fn what_has_no_hollows_never_shadows_itself() {
             }
         }
     }
-    assert!(seen > 20_000, "only {seen} pixels are lit at all");
+    assert!(seen > 10_000, "only {seen} pixels are lit at all");
     assert!(faults.is_empty(), "{} shadow themselves:\n{}", faults.len(), faults.concat());
 }
 

@@ -66,7 +66,7 @@ fn terms_add_up_to_the_picture() {
         }
     }
     // Traced pictures of these take long: the sums are the same ones
-    for seed in 0..times(200) {
+    for seed in 0..times(100) {
         let desc = exact_scenes::scene(seed, 8);
         let scene = desc.compile(&NoAssets, &CompileOptions::default()).unwrap_or_else(|e| panic!("{e}")).scene;
         if scene.summary().lights.len() <= 16 {

@@ -12,7 +12,6 @@
 //! alone, bins are joined by minimum, maximum and whole numbers, and the tasks' results are joined in their order.
 
 use glam::{BVec4A, UVec4, Vec4, Vec4Swizzles};
-use rayon::prelude::*;
 
 use super::Aabb;
 use super::node::{BoxNode, LEAF, Tree, WIDTH};
@@ -33,7 +32,7 @@ const MAX_DEPTH: usize = 96;
 const ROUNDER: f32 = 8_388_608.0;
 
 /// A primitive while the tree is built: its box, relative to the centre, and its id in the bits of `lo.w`.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Prim {
     lo: Vec4,
     hi: Vec4,
@@ -149,7 +148,7 @@ pub(crate) fn build<K: Ord>(
         Prim { lo: min.extend(f32::from_bits(i as u32)), hi: max.extend(0.0) }
     };
     let is_sound = |prim: &Prim| Aabb { min: prim.lo.xyz(), max: prim.hi.xyz() }.is_sound();
-    let mut prims: Vec<Prim> = (0..count).into_par_iter().with_min_len(CHUNK).map(prim).collect();
+    let mut prims: Vec<Prim> = parallel::map(count, CHUNK, prim);
     if !parallel::all(prims.len(), CHUNK, |i| is_sound(&prims[i])) {
         prims.retain(is_sound);
     }

@@ -3,8 +3,6 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use super::SceneDesc;
 use super::advice::advise_reflectance;
 use super::compile::check_unique;
@@ -15,6 +13,7 @@ use crate::ids::TextureId;
 use crate::image::ImageError;
 use crate::image::read::{Limits, PictureHeader, decode, read_header};
 use crate::material::{Material, UvSetUse};
+use crate::parallel;
 use crate::shape::{CompileCache, ShapeDesc, UV_SETS, key_of};
 use crate::texture::{
     CheckerboardDesc, ImageTextureDesc, MaskRule, Param, Params, Pyramid, Texture, TextureDesc, TexturePattern,
@@ -197,7 +196,7 @@ impl<'a> TextureRequests<'a> {
             }
         }
         let read: Vec<Result<PictureFile, TextureFault>> =
-            files.par_iter().map(|(file, ..)| read_file(self.assets, file)).collect();
+            parallel::collect(files.len(), |file| read_file(self.assets, &files[file].0));
         // Each content once, however many files have it
         let mut pictures: Vec<SharedPicture> = Vec::new();
         let mut picture_of: HashMap<[u8; 32], usize> = HashMap::new();
@@ -217,7 +216,7 @@ impl<'a> TextureRequests<'a> {
             return Textures::nothing();
         }
         let made: Vec<Result<Vec<Arc<Pyramid>>, ImageError>> =
-            pictures.par_iter().map(|picture| picture.pyramids(self.cache)).collect();
+            parallel::collect(pictures.len(), |picture| pictures[picture].pyramids(self.cache));
         // Say what is wrong, file by file
         let mut textures = Textures::nothing();
         for ((file, index, uses), read) in files.iter().zip(&read) {

@@ -4,12 +4,11 @@
 //! filter. Sides that are odd take three texels for one, each as far as it lies within (the polyphase box of Guthe and
 //! Heckbert, "Non-power-of-two mipmap creation", NVIDIA 2005), so that no level is shifted against another.
 
-use rayon::prelude::*;
-
 use super::TextureSpace;
 use super::texels::{Covered, Level, Normal8, Normal16, Stored, Tables, Texel, of_texels, padded, unit};
 use crate::describe::Channel;
 use crate::image::read::{TexelSamples, Texels};
+use crate::parallel;
 
 /// What a picture is read for: the same file may be several.
 #[allow(dead_code, reason = "materials with masks come next")]
@@ -273,7 +272,7 @@ fn halve([width, height]: [usize; 2], at: impl Fn(usize, usize) -> [f32; 4] + Sy
     let half = [width, height].map(|side| (side / 2).max(1));
     let mut image = vec![[0.0; 4]; half[0] * half[1]];
     let even = width.is_multiple_of(2) && height.is_multiple_of(2);
-    image.par_chunks_mut(half[0]).enumerate().for_each(|(j, row)| {
+    parallel::for_each_chunk(&mut image, half[0], |j, row| {
         if even {
             for (i, mean) in row.iter_mut().enumerate() {
                 let [a, b] = [0, 1].map(|k| at(2 * i + k, 2 * j));

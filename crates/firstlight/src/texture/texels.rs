@@ -2,10 +2,9 @@
 
 use std::sync::LazyLock;
 
-use rayon::prelude::*;
-
 use super::TextureSpace;
 use crate::color::Encoding;
+use crate::parallel;
 
 /// Texels on a side of a tile: 16 of 4 bytes are one line of a processor's cache.
 const TILE: usize = 4;
@@ -308,7 +307,7 @@ impl Level {
     ) -> Self {
         let across = tiles(width);
         let mut texels = vec![T::default(); across * tiles(height) * TILE * TILE];
-        texels.par_chunks_mut(across * TILE * TILE).enumerate().for_each(|(row, tiles)| {
+        parallel::for_each_chunk(&mut texels, across * TILE * TILE, |row, tiles| {
             for (i, tile) in tiles.chunks_mut(TILE * TILE).enumerate() {
                 for (k, texel) in tile.iter_mut().enumerate() {
                     let (x, y) = (i * TILE + k % TILE, row * TILE + k / TILE);
