@@ -26,7 +26,9 @@ use xtask::{Outcome, cargo, root, run};
 #[derive(Parser)]
 #[command(
     name = "cargo xtask",
-    after_help = "cargo xtask test  runs every check and every test; needs Rust and nothing else"
+    after_help = "Without the library:\n  test   runs every check and every test; needs Rust and nothing else\n  \
+                  dist   builds the program as it is handed out, in target/dist\n  \
+                  wheel  builds the Python package, as a wheel and as sources, in target/wheels"
 )]
 struct Args {
     #[command(subcommand)]

@@ -1,7 +1,11 @@
 //! What the project's own commands are started with.
 
+mod dist;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
+
+pub use dist::{dist, target_folder, wheel};
 
 /// What a command ends with: nothing, or what went wrong.
 pub type Outcome = Result<(), String>;

@@ -1,12 +1,12 @@
-//! `cargo xtask test`: every check, then every test, so that the test runner has the last word. All other commands are
-//! handed to `firstlight-tools`: they need the library, and cargo would build it for them in another way than for the
-//! tests.
+//! `cargo xtask test`: every check, then every test, so that the test runner has the last word; `cargo xtask dist` and
+//! `cargo xtask wheel`: what is handed out. All other commands are handed to `firstlight-tools`: they need the library,
+//! and cargo would build it for them in another way than for the tests.
 
 use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
 
-use xtask::{Outcome, cargo, root, run as run_to_end};
+use xtask::{Outcome, cargo, dist, root, run as run_to_end, target_folder, wheel};
 
 /// Builds the book, where mdBook is installed; its links are among the tests.
 fn build_book() -> Outcome {
@@ -49,7 +49,7 @@ fn test_python() -> Outcome {
     let library = if cfg!(target_os = "macos") { "lib_firstlight.dylib" } else { "lib_firstlight.so" };
     // With the tests beside it, so that nothing is compiled twice
     run_command(&["build", "--workspace", "--lib", "--bins", "--tests", "--examples", "--quiet"])?;
-    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), Into::into);
+    let target = target_folder();
     let (home, crates) = (target.join("python"), root().join("crates/firstlight-python"));
     let site = home.join("site/firstlight");
     let copy = |from: &Path, to: &Path| {
@@ -107,10 +107,13 @@ fn hand_on(args: &[OsString]) -> ExitCode {
 
 fn main() -> ExitCode {
     let args: Vec<OsString> = std::env::args_os().skip(1).collect();
-    if args != ["test"] {
-        return hand_on(&args);
-    }
-    match test() {
+    let outcome = match args.as_slice() {
+        [command] if command == "test" => test(),
+        [command] if command == "dist" => dist(),
+        [command] if command == "wheel" => wheel(),
+        _ => return hand_on(&args),
+    };
+    match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
             eprintln!("xtask: {fault}");
