@@ -77,8 +77,8 @@ pub(crate) struct Tolerance {
     pub half_of_rays: f32,
 
     // Samples of a light
-    /// In samples, for a tolerance of 1: the first of a pixel; for others it is divided by the root of the tolerance.
-    /// Runs: rms 0.105 and 0.101, time 0.96 and 1.14.
+    /// In samples, for a tolerance of 1: the first of a pixel; for others it is divided by the tolerance. Runs: rms
+    /// 0.105 and 0.101, time 0.96 and 1.14.
     pub first_points: f32,
     /// A factor of that where the light is nearer than its samples are apart. Runs: rms 0.104 and 0.104, time 1.02 and
     /// 1.05.

@@ -586,10 +586,13 @@ impl<'a> CellRenderer<'a> {
             let pixel = self.pixel_of(fragment);
             let at = self.at(pixel);
             let rays = self.pixel_rays.of(self.scene, at);
-            self.fragments.trace(self.scene, fragment, at, rays);
-            let count = self.fragments.all[fragment].count;
-            self.sums.work[pixel] += count as f32;
-            counts.looks += u64::from(count);
+            // Shadows of lights that have an extent are wide: a pixel needs one point there as well
+            let is_one = self.mode == AaMode::Multisample && self.lights.are_all_integrated();
+            let most = if is_one { 1 } else { rays.len() };
+            self.fragments.trace(self.scene, fragment, at, rays, most);
+            let traced = self.fragments.all[fragment].rays.len();
+            self.sums.work[pixel] += traced as f32;
+            counts.looks += traced as u64;
         }
     }
 

@@ -203,6 +203,11 @@ impl<'a> DirectLighting<'a> {
         self.scene.lights[index].is_integrated()
     }
 
+    /// Whether that is so of all lights.
+    pub fn are_all_integrated(&self) -> bool {
+        (0..self.scene.lights.len()).all(|light| self.is_integrated(light))
+    }
+
     /// Whether what an area light sends past no occluders is integrated without samples.
     pub fn has_closed_form(&self, index: usize) -> bool {
         self.lights.emitters[index].is_some()

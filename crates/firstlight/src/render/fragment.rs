@@ -335,16 +335,23 @@ impl Fragments {
         true
     }
 
-    /// Computes the shading points of the rays of a fragment that was [added whole](Self::add_whole). Rays that miss it
-    /// by a rounding get the point of the last one that does not.
-    pub fn trace(&mut self, scene: &Scene, fragment: usize, [i, j]: [u32; 2], rays: &[Ray]) {
+    /// Computes the shading points of the rays of a fragment that was [added whole](Self::add_whole): of all, or of
+    /// the `most` from the middle of the pixel on; one has the mean material. Rays that miss it by a rounding get the
+    /// point of the last one that does not.
+    pub fn trace(&mut self, scene: &Scene, fragment: usize, [i, j]: [u32; 2], rays: &[Ray], most: usize) {
         let n = scene.antialiasing;
         let first = self.rays.len();
         let Fragment { shape, mean, .. } = &mut self.all[fragment];
         let shape = shape.expect("fragments in the trees are traced at once");
-        for (k, ray) in (0..).zip(rays) {
+        let wanted = rays.len().min(most);
+        let middle = if wanted < rays.len() { (n - 1) / 2 * (n + 1) } else { 0 };
+        for k in (0..n * n).map(|k| (k + middle) % (n * n)) {
+            let ray = &rays[k as usize];
+            if self.rays.len() == first + wanted {
+                break;
+            }
             if let Some(t) = shape.intersect(scene, ray) {
-                let bsdf = match mean.is_constant {
+                let bsdf = match mean.is_constant || wanted == 1 {
                     true => mean.bsdf,
                     false => shape.bsdf(scene, ray, t, &camera_ray(scene, i * n + k % n, j * n + k / n).1),
                 };
@@ -352,14 +359,16 @@ impl Fragments {
                 self.at.push([k % n, k / n].map(|at| at as u16));
             }
         }
+        let is_missed = self.rays.len() == first;
         if let Some(last) = self.rays[first..].last().copied() {
-            self.rays.resize(first + rays.len(), last);
-            self.at.resize(first + rays.len(), *self.at.last().expect("each ray has one"));
+            self.rays.resize(first + wanted, last);
+            self.at.resize(first + wanted, *self.at.last().expect("each ray has one"));
         }
-        let closed_form_budget = 1.0 / (self.rays.len() - first) as f32;
+        let closed_form_budget = 1.0 / wanted as f32;
         self.rays[first..].iter_mut().for_each(|point| point.closed_form_budget = closed_form_budget);
         let fragment = &mut self.all[fragment];
-        (fragment.rays, fragment.count) = (first..self.rays.len(), (self.rays.len() - first) as u32);
+        fragment.rays = first..self.rays.len();
+        fragment.count = if is_missed { 0 } else { rays.len() as u32 };
     }
 
     /// Computes the quadrants of a fragment: its parts in the quarters of its pixel. There are none if they cannot

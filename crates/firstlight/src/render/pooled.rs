@@ -230,7 +230,7 @@ impl PooledVisibility {
         counts: &mut Counts,
     ) -> [f32; MOMENTS] {
         let sampler = lights.sampler(self.light);
-        let mut first = TOLERANCE.first_points / (lights.scene.tolerance() as f32).sqrt();
+        let mut first = TOLERANCE.first_points / lights.scene.tolerance() as f32;
         if !sampler.varies_over(&receivers[0].place(self.each), sampler.spacing(first)) {
             first *= TOLERANCE.nearer;
         }
