@@ -42,8 +42,8 @@ pub(crate) struct ShownModel<'a> {
 
 /// Most instances of all nodes together.
 const MAX_INSTANCES: usize = 1 << 22;
-/// Bytes that a place of a mesh counts for, and the name of each of its materials. A place takes 12 bytes of the file at
-/// least where it is right, and files may take many times their length.
+/// Bytes that a place of a mesh counts for, and the name of each of its materials: less than a file may take for the 12
+/// bytes of a place that is right.
 const PLACE_BYTES: u64 = 256;
 const MATERIAL_BYTES: u64 = 64;
 
