@@ -8,15 +8,6 @@
 use firstlight_testkit::hostile_picture;
 
 libfuzzer_sys::fuzz_target!(
-    init: {
-        if std::env::var_os("FUZZ_DECODERS").is_none() {
-            let hook = std::panic::take_hook();
-            std::panic::set_hook(Box::new(move |panic| {
-                if !firstlight::is_decoding() {
-                    hook(panic);
-                }
-            }));
-        }
-    },
+    init: hostile_picture::pass_over_decoders(),
     |data: &[u8]| hostile_picture::check(data)
 );

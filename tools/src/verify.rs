@@ -28,14 +28,21 @@ const PYRENDER: [&[&str]; 2] = [&["pyrender"], &["--no-deps", "PyOpenGL>=3.1.7"]
 /// The rays that each mesh is asked, by its tree and triangle by triangle.
 const RAYS: &str = "1000000";
 
+/// The `FIRSTLIGHT_SCENES` with which 20,000 models are damaged.
+const DAMAGED: u32 = 2000;
+
 /// The tests that `cargo test` leaves out render until nothing changes any more; those that grow with
 /// `FIRSTLIGHT_SCENES` compare the renderers on that many random scenes; those that grow with `FIRSTLIGHT_RAYS` compare
-/// the trees of meshes with asking every triangle.
+/// the trees of meshes with asking every triangle. Of models that are damaged at random there are 20,000.
 pub fn run(scenes: u32) -> Outcome {
     let mut command = cargo();
     command.env("FIRSTLIGHT_SCENES", scenes.to_string());
     let test = ["test", "--release", "--package", "firstlight-testkit", "--test", "truth"];
     run_to_end(command.args(test).args(["--", "--include-ignored"]))?;
+    let mut command = cargo();
+    command.env("FIRSTLIGHT_SCENES", DAMAGED.to_string());
+    let test = ["test", "--release", "--package", "firstlight-testkit", "--test", "it", "damaged_models"];
+    run_to_end(command.args(test).args(["--", "--nocapture"]))?;
     let mut command = cargo();
     command.env("FIRSTLIGHT_RAYS", RAYS);
     run_to_end(command.args(["test", "--release", "--package", "firstlight", "--lib", "shape::triangles"]))

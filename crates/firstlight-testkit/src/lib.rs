@@ -3,19 +3,22 @@
 //!
 //! [`scenes`] builds scenes and looks at them; [`random`] and [`exact_scenes`] make them up, with [`pictures`] by
 //! formula; [`converged`] knows how they look when nothing is left to chance, with [`graded`] points where a light is
-//! near and [`kept`] files where that took long; [`hostile_text`], [`hostile_mesh`] and [`hostile_picture`] are what
-//! fuzzing holds the readers to.
+//! near and [`kept`] files where that took long; [`hostile_text`], [`hostile_mesh`], [`hostile_model`] and
+//! [`hostile_picture`] are what fuzzing holds the readers to, and [`damaged`] makes files for them.
 
 #![allow(missing_docs, reason = "tests say what they build by its name")]
 
 #[cfg(feature = "scenes")]
 pub mod converged;
+pub mod damaged;
 #[cfg(feature = "scenes")]
 pub mod exact_scenes;
 #[cfg(feature = "scenes")]
 pub mod graded;
 #[cfg(feature = "scenes")]
 pub mod hostile_mesh;
+#[cfg(feature = "scenes")]
+pub mod hostile_model;
 #[cfg(feature = "scenes")]
 pub mod hostile_picture;
 #[cfg(feature = "scenes")]

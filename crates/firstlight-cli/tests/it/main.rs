@@ -12,6 +12,7 @@ mod faults;
 mod files;
 mod found;
 mod frames;
+mod hostile_models;
 mod motion;
 mod pictures;
 mod relight;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use firstlight_testkit::{hostile_picture, hostile_text};
+use firstlight_testkit::{hostile_model, hostile_picture, hostile_text};
 
 /// Checks each input of a folder of the corpus.
 fn replay(folder: &str, check: impl Fn(&[u8])) {
@@ -24,4 +24,11 @@ fn nothing_in_the_corpus_breaks_the_reader() {
 #[test]
 fn no_picture_in_the_corpus_does_harm() {
     replay("picture", hostile_picture::check);
+}
+
+#[test]
+fn no_model_in_the_corpus_does_harm() {
+    for kind in ["gltf", "glb", "mtl"] {
+        replay(kind, |bytes| hostile_model::check_bytes(kind, bytes));
+    }
 }

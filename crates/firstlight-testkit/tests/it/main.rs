@@ -7,6 +7,7 @@ mod files;
 mod framing;
 mod fuzz_corpus;
 mod golden;
+mod hostile_models;
 mod house;
 mod images;
 mod invalid;

@@ -1,5 +1,5 @@
 //! Meshes as scenes take them: without the vertices that no triangle uses, and with normals as surfaces need them, of
-//! length 1, and one at each corner of a triangle that has any.
+//! length 1, one at each corner of a triangle that has any, and with colours and texture coordinates that are numbers.
 
 use super::MeshData;
 use crate::math::{DVec3, UNIT_ROUNDOFF};
@@ -8,13 +8,30 @@ use crate::parallel::{self, CHUNK};
 /// How far the square of a length may be from 1 where three coordinates are rounded to f32: such a normal keeps its
 /// bits.
 const ROUNDED: f64 = 8.0 * UNIT_ROUNDOFF as f64;
+/// The largest texture coordinate, and the largest channel of a colour: those of meshes in lists.
+const MAX_UV: f32 = 1e30;
+const MAX_COLOR: f32 = 1e6;
 
 impl MeshData {
     /// Takes out the vertices of no triangle and makes normals unit. Nothing that can be seen is another place; once
     /// done, doing it again changes nothing.
     pub(crate) fn tidy(&mut self) {
         self.drop_unused_vertices();
+        self.make_numbers_finite();
         self.make_normals_unit();
+    }
+
+    /// Texture coordinates and colours that are no numbers are 0 and white; all are held to what lists may have.
+    pub(crate) fn make_numbers_finite(&mut self) {
+        let place = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(-MAX_UV, MAX_UV) };
+        for set in &mut self.uvs {
+            parallel::for_each_mut(set, CHUNK, |_, uv| *uv = uv.map(place));
+        }
+        let color = |x: f32| if x.is_nan() { 1.0 } else { x.clamp(0.0, MAX_COLOR) };
+        parallel::for_each_mut(&mut self.colors, CHUNK, |_, rgba| {
+            *rgba = rgba.map(color);
+            rgba[3] = rgba[3].min(1.0);
+        });
     }
 
     /// Of each vertex, whether a triangle has it. Indices may be out of range.
@@ -202,5 +219,19 @@ mod tests {
         mesh.tidy();
         assert_eq!(mesh.triangles, [[4, 5, 2], [1, 0, 3]]);
         assert_eq!((mesh.normals[0], mesh.normals[1]), ([0.0; 3], [0.0; 3]));
+    }
+
+    #[test]
+    fn what_is_no_number_is_one() {
+        let mut mesh = MeshData {
+            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            triangles: vec![[0, 1, 2]],
+            uvs: vec![vec![[f32::NAN, f32::NEG_INFINITY], [f32::MAX, 0.25], [-3.0, 1e9]]],
+            colors: vec![[f32::NAN, 0.5, f32::INFINITY, 1.0], [-1.0, 2.0, 0.0, 2.0], [1.0; 4]],
+            ..MeshData::default()
+        };
+        mesh.tidy();
+        assert_eq!(mesh.uvs, [[[0.0, -1e30], [1e30, 0.25], [-3.0, 1e9]]]);
+        assert_eq!(mesh.colors, [[1.0, 0.5, 1e6, 1.0], [0.0, 2.0, 0.0, 1.0], [1.0; 4]]);
     }
 }

@@ -1,8 +1,9 @@
 //! Models of one mesh or of points: PLY, STL and OBJ.
 
-use std::collections::HashSet;
+use std::cell::RefCell;
+use std::collections::{HashMap, HashSet};
 
-use super::{ModelParts, ModelShape, ModelWarning, MtlSettings, clay, material_name, read_mtl, shown, unique};
+use super::{ModelParts, ModelShape, ModelWarning, MtlSettings, UniqueNames, clay, material_name, read_mtl, shown};
 use crate::context::{AssetError, Assets};
 use crate::describe::FilePath;
 use crate::describe::value::join_path;
@@ -16,8 +17,10 @@ use crate::texture::TextureDesc;
 const SMOOTH_DEG: f64 = 30.0;
 /// The height of white in a bump map of an MTL file with `-bm 1`, in sizes of the model: the file has no unit of it.
 const BUMP_HEIGHT: f64 = 0.01;
-/// The largest MTL file, in bytes.
+/// All MTL files of a model together, in bytes.
 const MAX_MTL: u64 = 64 << 20;
+/// Names of MTL files that are looked for.
+const MAX_MTL_FILES: usize = 1000;
 /// The largest picture that is looked at for alpha, in bytes.
 const MAX_PICTURE: u64 = 1 << 30;
 
@@ -38,8 +41,8 @@ pub(crate) struct ShownMesh<'a> {
 pub(crate) fn describe_mesh(data: &MeshData, shown_mesh: &ShownMesh<'_>) -> ModelParts {
     let ShownMesh { file, smooth_deg, unlit, chosen, .. } = *shown_mesh;
     let mut parts = ModelParts::default();
-    let taken = |name: &str| data.materials.iter().any(|own| material_name(file, own, unlit) == name);
-    let default = unique(material_name(file, "default", unlit), taken);
+    let mut names: UniqueNames = data.materials.iter().map(|own| material_name(file, own, unlit)).collect();
+    let default = names.unique(material_name(file, "default", unlit));
     let smooth_deg = smooth_deg.or(data.normals.is_empty().then_some(SMOOTH_DEG));
     let mut mesh = MeshDesc { file: Some(FilePath(file.to_owned())), smooth_deg, ..MeshDesc::default() };
     let size = data.used_bounds().map_or(0.0, |[low, high]| (high - low).length());
@@ -70,36 +73,23 @@ fn has_colors(data: &MeshData) -> bool {
 /// Adds the materials of the MTL files that faces of the mesh have; the answer are their names in the file.
 fn add_mtl(parts: &mut ModelParts, data: &MeshData, shown_mesh: &ShownMesh<'_>, size: f64) -> HashSet<String> {
     let ShownMesh { file, unlit, chosen, assets, .. } = *shown_mesh;
-    let folder = file.rsplit_once('/').map_or("", |(folder, _)| folder);
+    let wanted: HashSet<&str> = data.materials.iter().map(String::as_str).collect();
     let mut described = HashSet::new();
-    // A name may hold blanks; where there is no file of such a name, the line has several
-    let names = data.material_files.iter().flat_map(|line| match read_beside(line, folder, assets) {
-        Some(_) => vec![line.as_str()],
-        None => line.split_whitespace().collect(),
-    });
-    for written in names {
-        let Some((path, bytes)) = read_beside(written, folder, assets) else {
-            let message = format!("{written:?}: there is no such file of materials");
-            let hint = "its faces are of a light gray; an OBJ file needs its MTL files beside it";
-            parts.warnings.push(ModelWarning { message, hint: hint.to_owned() });
-            continue;
-        };
-        let bytes = match bytes {
-            Ok(bytes) => bytes,
-            Err(error) => {
-                let hint = "its faces are of a light gray".to_owned();
-                parts.warnings.push(ModelWarning { message: format!("{path:?}: {error}"), hint });
-                continue;
-            }
-        };
+    // Many materials may have the same picture
+    let alphas: RefCell<HashMap<String, Option<bool>>> = RefCell::default();
+    for (path, bytes) in mtl_files(parts, data, file, assets) {
         let inside = path.rsplit_once('/').map_or("", |(folder, _)| folder).to_owned();
         let has_alpha = |picture: &str| {
-            let bytes = assets.read(&join_path(&inside, picture), MAX_PICTURE).ok()?;
-            Some(read_header(&bytes, &Limits::default()).ok()?.has_alpha())
+            let picture = join_path(&inside, picture);
+            if let Some(known) = alphas.borrow().get(&picture) {
+                return *known;
+            }
+            let header = assets.read(&picture, MAX_PICTURE).ok().map(|bytes| read_header(&bytes, &Limits::default()));
+            let has_alpha = header.and_then(Result::ok).map(|header| header.has_alpha());
+            alphas.borrow_mut().insert(picture, has_alpha);
+            has_alpha
         };
-        let is_wanted = |name: &str| {
-            data.materials.iter().any(|own| own == name) && !described.contains(name) && chosen(name).is_none()
-        };
+        let is_wanted = |name: &str| wanted.contains(name) && !described.contains(name) && chosen(name).is_none();
         let settings = MtlSettings {
             is_wanted: &is_wanted,
             texture_name: &|name| format!("{path}/{name}"),
@@ -132,21 +122,92 @@ fn add_mtl(parts: &mut ModelParts, data: &MeshData, shown_mesh: &ShownMesh<'_>, 
     described
 }
 
-/// A file that an OBJ file names, from the folder of that; where its path leads nowhere, by its own name beside it. The
-/// answer is its path in the scene.
-fn read_beside(written: &str, folder: &str, assets: &dyn Assets) -> Option<(String, Result<Vec<u8>, AssetError>)> {
-    let written = written.trim().replace('\\', "/");
-    let alone = written.rsplit('/').next().unwrap_or_default();
-    let mut refused = None;
-    for path in [written.as_str(), alone] {
-        let path = join_path(folder, path);
-        match assets.read(&path, MAX_MTL) {
-            Err(AssetError::NotFound) => {}
-            Err(error @ AssetError::Outside) => refused = Some((path, Err(error))),
-            read => return Some((path, read)),
+/// The MTL files that the OBJ file `file` names, each once, with their paths in the scene. What cannot be read is told.
+fn mtl_files(parts: &mut ModelParts, data: &MeshData, file: &str, assets: &dyn Assets) -> Vec<(String, Vec<u8>)> {
+    let folder = file.rsplit_once('/').map_or("", |(folder, _)| folder);
+    let mut files =
+        MtlFiles { folder, assets, left: MAX_MTL, asked: HashSet::new(), list: Vec::new(), warnings: vec![] };
+    for line in &data.material_files {
+        // A name may hold blanks; where there is no file of such a name, the line has several
+        if files.is_new(line) && !files.read(line) {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            for word in &words {
+                if (words.len() == 1 || files.is_new(word) && !files.read(word)) && !files.is_full() {
+                    let message = format!("{word:?}: there is no such file of materials");
+                    files.warn(message, "its faces are of a light gray; an OBJ file needs its MTL files beside it");
+                }
+            }
+        }
+        if files.is_full() {
+            let message = format!("it names more than {MAX_MTL_FILES} files of materials: the others are not read");
+            files.warn(message, "write the materials of a model into one file");
+            break;
         }
     }
-    refused
+    parts.warnings.append(&mut files.warnings);
+    files.list
+}
+
+/// MTL files while they are read.
+struct MtlFiles<'a> {
+    /// That of the OBJ file.
+    folder: &'a str,
+    assets: &'a dyn Assets,
+    /// Bytes that may still be read.
+    left: u64,
+    /// Names and paths that were asked for.
+    asked: HashSet<String>,
+    list: Vec<(String, Vec<u8>)>,
+    warnings: Vec<ModelWarning>,
+}
+
+impl MtlFiles<'_> {
+    fn warn(&mut self, message: String, hint: &str) {
+        self.warnings.push(ModelWarning { message, hint: hint.to_owned() });
+    }
+
+    fn is_full(&self) -> bool {
+        self.asked.len() > MAX_MTL_FILES
+    }
+
+    /// Whether nobody asked for that name before.
+    fn is_new(&mut self, written: &str) -> bool {
+        !self.is_full() && self.asked.insert(written.to_owned())
+    }
+
+    /// Reads the file of that name, from the folder of the OBJ file; where its path leads nowhere, by its own name
+    /// beside it. Answers whether there is one.
+    fn read(&mut self, written: &str) -> bool {
+        let written = written.trim().replace('\\', "/");
+        let alone = written.rsplit('/').next().unwrap_or_default();
+        let mut refused = None;
+        for path in [written.as_str(), alone] {
+            let path = join_path(self.folder, path);
+            if self.list.iter().any(|(known, _)| *known == path) {
+                return true;
+            }
+            match self.assets.read(&path, self.left) {
+                Err(AssetError::NotFound) => {}
+                Err(error @ AssetError::Outside) => refused = Some((path, error)),
+                Err(error) => {
+                    self.warn(format!("{path:?}: {error}"), "its faces are of a light gray");
+                    return true;
+                }
+                Ok(bytes) => {
+                    self.left -= bytes.len() as u64;
+                    self.list.push((path, bytes));
+                    return true;
+                }
+            }
+        }
+        match refused {
+            Some((path, error)) => {
+                self.warn(format!("{path:?}: {error}"), "its faces are of a light gray");
+                true
+            }
+            None => false,
+        }
+    }
 }
 
 /// What a file of points describes.
@@ -222,5 +283,44 @@ mod tests {
         let parts = described(&["red"], "none.mtl b.mtl", &[("m/b.mtl", red)]);
         assert_eq!(parts.warnings.len(), 1);
         assert_eq!(parts.warnings[0].message, "\"none.mtl\": there is no such file of materials");
+    }
+
+    /// Files, and which were asked for.
+    struct Watched<'a>(&'a MemoryAssets, std::sync::Mutex<Vec<String>>);
+
+    impl Assets for Watched<'_> {
+        fn read(&self, path: &str, limit: u64) -> Result<Vec<u8>, AssetError> {
+            self.1.lock().unwrap().push(path.to_owned());
+            self.0.read(path, limit)
+        }
+    }
+
+    #[test]
+    fn files_that_are_named_again_and_again_are_read_once() {
+        let mut assets = MemoryAssets::default();
+        let names: Vec<String> = (0..5000).map(|i| format!("m{i}")).collect();
+        let mtl: String = names.iter().map(|name| format!("newmtl {name}\nmap_d x.png\n")).collect();
+        assets.files.insert("m/a.mtl".into(), mtl.into_bytes());
+        let watched = Watched(&assets, std::sync::Mutex::default());
+        let mut lines = vec!["a.mtl".to_owned(), "./a.mtl a.mtl .//a.mtl".to_owned(), "C:/x/a.mtl".to_owned()];
+        lines.extend(std::iter::repeat_n("a.mtl".to_owned(), 5000));
+        let mut data = MeshData {
+            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            triangles: vec![[0, 1, 2]; names.len()],
+            face_materials: (0..names.len() as u32).collect(),
+            materials: names,
+            material_files: lines,
+            ..MeshData::default()
+        };
+        let chosen = |_: &str| None;
+        let shown = ShownMesh { file: "m/a.obj", smooth_deg: None, unlit: false, chosen: &chosen, assets: &watched };
+        assert_eq!(describe_mesh(&data, &shown).materials.len(), 5001);
+        let of = |name: &str| watched.1.lock().unwrap().iter().filter(|path| *path == name).count();
+        assert_eq!((of("m/a.mtl"), of("m/x.png")), (1, 1), "{:?}", watched.1.lock().unwrap());
+        // Names without end
+        data.material_files = vec![(0..100_000).map(|i| format!("{i}.mtl ")).collect()];
+        let warnings = describe_mesh(&data, &shown).warnings;
+        assert!(warnings.len() <= MAX_MTL_FILES + 2 && watched.1.lock().unwrap().len() < 5000, "{}", warnings.len());
+        assert!(warnings[warnings.len() - 2].message.contains("more than 1000 files"), "{:?}", warnings.last());
     }
 }

@@ -13,6 +13,8 @@ pub(crate) use gltf::{ShownModel, describe as describe_gltf};
 pub(crate) use mesh::{ShownMesh, describe_mesh, describe_points};
 pub use mtl::{MtlMaterials, MtlSettings, read_mtl};
 
+use std::collections::{HashMap, HashSet};
+
 use crate::camera::CameraDesc;
 use crate::describe::{ColorParam, NumberParam};
 use crate::light::LightDesc;
@@ -51,12 +53,35 @@ pub(crate) struct ModelWarning {
     pub hint: String,
 }
 
-/// `name`, or with a number behind it if it is taken.
-pub(crate) fn unique(name: String, taken: impl Fn(&str) -> bool) -> String {
-    if !taken(&name) {
-        return name;
+/// Names of which each is given once. A file may give the same one to all its materials: what is taken is not searched.
+#[derive(Debug, Default)]
+pub(crate) struct UniqueNames {
+    taken: HashSet<String>,
+    /// The last number behind a name that was given.
+    numbers: HashMap<String, u64>,
+}
+
+impl UniqueNames {
+    /// `name`, or with the least number behind it that is not taken.
+    pub fn unique(&mut self, name: String) -> String {
+        if self.taken.insert(name.clone()) {
+            return name;
+        }
+        let number = self.numbers.entry(name.clone()).or_insert(1);
+        loop {
+            *number += 1;
+            let numbered = format!("{name} {number}");
+            if self.taken.insert(numbered.clone()) {
+                return numbered;
+            }
+        }
     }
-    (2..).map(|number| format!("{name} {number}")).find(|name| !taken(name)).expect("numbers do not end")
+}
+
+impl FromIterator<String> for UniqueNames {
+    fn from_iter<T: IntoIterator<Item = String>>(names: T) -> Self {
+        UniqueNames { taken: names.into_iter().collect(), numbers: HashMap::new() }
+    }
 }
 
 /// The material that shows the colour of another one, whatever light there is.
@@ -88,4 +113,16 @@ const CLAY: [f64; 3] = [0.66, 0.64, 0.61];
 pub(crate) fn clay(has_colors: bool) -> MaterialDesc {
     let base_color = if has_colors { ColorParam::gray(1.0) } else { CLAY.into() };
     MaterialDesc::MetallicRoughness(MetallicRoughnessDesc { base_color, ..MetallicRoughnessDesc::default() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_given_once_with_the_least_number() {
+        let mut names: UniqueNames = ["b".to_owned(), "a 3".to_owned()].into_iter().collect();
+        let given = ["a", "a", "a", "b", "a 2", "a", "b 2"].map(|name| names.unique(name.to_owned()));
+        assert_eq!(given, ["a", "a 2", "a 4", "b 2", "a 2 2", "a 5", "b 2 2"]);
+    }
 }

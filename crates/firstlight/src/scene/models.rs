@@ -13,8 +13,8 @@ use crate::error::{SceneError, Severity};
 use crate::import::{MeshFormat, OpenFault, is_gltf, is_point_set};
 use crate::material::MaterialDesc;
 use crate::math::{DAffine3, DMat3, DVec3};
-use crate::model::{ModelParts, ShownMesh, ShownModel, describe_gltf, describe_mesh, describe_points, unique};
-use crate::shape::{GroupDesc, MeshFiles, ModelDesc, ShapeDesc, UpAxis, load_mesh_file, read_mesh_bytes, unreadable};
+use crate::model::{ModelParts, ShownMesh, ShownModel, describe_gltf, describe_mesh, describe_points};
+use crate::shape::{MeshFiles, ModelDesc, ShapeDesc, UpAxis, load_mesh_file, read_mesh_bytes, unreadable};
 use crate::transform::TransformDesc;
 
 /// What kind of model a file is.
@@ -108,7 +108,7 @@ impl SceneDesc {
         &mut self,
         cx: &mut CompileContext,
         model: &ModelDesc,
-        parts: ModelParts,
+        mut parts: ModelParts,
         world_from_model: DAffine3,
         shapes: &mut Vec<ShapeDesc>,
         is_scene: bool,
@@ -124,16 +124,24 @@ impl SceneDesc {
         add_new(&mut self.materials, parts.materials);
         // Those of another variant hold other materials
         let mut renamed: HashMap<String, String> = HashMap::new();
+        let mut known: HashMap<String, usize> =
+            self.groups.iter().enumerate().map(|(i, (name, _))| (name.clone(), i)).collect();
         for (name, group) in parts.groups {
-            let same = |(other, content): &(String, GroupDesc)| other.starts_with(&name) && *content == group;
-            let of = self.groups.iter().find(|other| same(other)).map(|(other, _)| other.clone());
-            let of = of.unwrap_or_else(|| {
-                let taken = |name: &str| self.groups.iter().any(|(other, _)| other == name);
-                let of = unique(name.clone(), taken);
-                cx.stands_in(format!("group.{of}.mesh[0]"), false);
-                self.groups.push((of.clone(), group));
-                of
-            });
+            let numbered = |number: u64| if number == 1 { name.clone() } else { format!("{name} {number}") };
+            let mut number = 1;
+            let of = loop {
+                let of = numbered(number);
+                match known.get(&of) {
+                    Some(&index) if self.groups[index].1 == group => break of,
+                    Some(_) => number += 1,
+                    None => {
+                        cx.stands_in(format!("group.{of}.mesh[0]"), false);
+                        known.insert(of.clone(), self.groups.len());
+                        self.groups.push((of.clone(), group));
+                        break of;
+                    }
+                }
+            };
             renamed.insert(name, of);
         }
         for part in parts.shapes {
@@ -156,13 +164,10 @@ impl SceneDesc {
             self.lights.sort_by_key(Family::kind_index);
         }
         if model.cameras && is_scene {
-            for (name, mut camera) in parts.cameras {
+            for (_, camera) in &mut parts.cameras {
                 camera.transform = transform_of(&world_from_model);
-                let taken = |name: &str| self.cameras.iter().any(|(other, _)| other == name);
-                if !taken(&name) {
-                    self.cameras.push((name, camera));
-                }
             }
+            add_new(&mut self.cameras, parts.cameras);
         }
     }
 }
@@ -242,6 +247,7 @@ impl ModelDesc {
                     time: if plays { Some(cx.time) } else { self.time },
                     chosen: &chosen,
                     unlit: self.unlit,
+                    assets,
                 };
                 match describe_gltf(&gltf, &shown) {
                     Ok(parts) => (parts, gltf.material_names()),

@@ -85,7 +85,9 @@ impl PointSetDesc {
                 if cx.error_count() == before && kept.is_some() {
                     return kept;
                 }
-                parse_mesh_file(cx, file, &bytes)?
+                let mut data = parse_mesh_file(cx, file, &bytes)?;
+                data.make_numbers_finite();
+                data
             }
             None => self.written(cx),
         };

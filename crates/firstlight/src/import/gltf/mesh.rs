@@ -11,6 +11,10 @@ use super::{Gltf, GltfFault};
 use crate::import::{MAX_COUNT, MeshData};
 use crate::math::{DAffine3, DMat3, DMat4, DVec3};
 
+/// Bytes that a primitive counts for, whatever it holds: its material, a note about it.
+const PRIMITIVE_BYTES: u64 = 256;
+/// Bytes of a triangle, with its material.
+const TRIANGLE_BYTES: u64 = 16;
 /// Sets of texture coordinates that are read; textures can name no more.
 const UV_SETS: usize = 4;
 
@@ -87,6 +91,8 @@ impl Gltf {
             None => mesh.list("weights")?.iter().map(|weight| Ok(weight.number()? as f32)).collect::<Result<_, _>>()?,
         };
         let posing = Posing { weights: &weights, bones: bones.as_deref() };
+        // Each node with a pose of its own reads them again, also those that hold nothing
+        self.take(&mesh, (mesh.count("primitives") as u64).saturating_mul(PRIMITIVE_BYTES))?;
         let mut data = MeshData::default();
         for (i, primitive) in mesh.list("primitives")?.iter().enumerate() {
             let name = match primitive.get("material") {
@@ -114,6 +120,8 @@ impl Gltf {
     /// What the bones of a skin do to vertices, as the nodes stand.
     fn bones(&self, skin: &JsonPlace<'_>, nodes: &[GltfNode]) -> Result<Vec<DAffine3>, GltfFault> {
         let skin = self.root().of_index("skins", skin)?;
+        // Each node with this skin has its own
+        self.take(&skin, (skin.count("joints") as u64).saturating_mul(size_of::<DAffine3>() as u64))?;
         let inverse = skin.get("inverseBindMatrices").map(|at| self.vectors::<16>(&at)).transpose()?;
         let mut bones = Vec::new();
         for (i, joint) in skin.list("joints")?.iter().enumerate() {
@@ -194,6 +202,8 @@ impl Gltf {
                 (0..count as u32).collect()
             }
         };
+        let triangles = if let Topology::Triangles = topology { indices.len() / 3 } else { indices.len() } as u64;
+        self.take(primitive, TRIANGLE_BYTES * triangles)?;
         let mut left_out = 0;
         let mut add = |corners: [u32; 3]| match corners.iter().all(|corner| (*corner as usize) < count) {
             true => data.triangles.push(corners.map(|corner| first + corner)),

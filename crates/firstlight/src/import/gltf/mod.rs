@@ -141,7 +141,7 @@ impl Gltf {
     }
 
     /// Sees that `bytes` more may be taken for what `at` says.
-    fn take(&self, at: &JsonPlace<'_>, bytes: u64) -> Result<(), GltfFault> {
+    pub fn take(&self, at: &JsonPlace<'_>, bytes: u64) -> Result<(), GltfFault> {
         let left = self.budget.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(bytes));
         match left {
             Ok(_) => Ok(()),

@@ -369,3 +369,34 @@ fn versions_and_wrong_types_are_named() {
         "/buffers/0: https: nothing is fetched from a network"
     );
 }
+
+/// What each node with a pose reads again is counted, however little the file says of it.
+#[test]
+fn what_is_read_for_each_pose_is_counted() {
+    let crowd = |element: Value, count: usize| std::iter::repeat_n(element, count).collect::<Vec<_>>();
+    let of = |skin: Value| {
+        open(&json!({
+            "asset": { "version": "2.0" },
+            "nodes": crowd(json!({ "mesh": 0, "skin": 0 }), 1000),
+            "meshes": [{ "primitives": crowd(json!({ "attributes": {} }), 1000) }],
+            "skins": [skin],
+        }))
+        .expect("opens")
+    };
+    for file in [of(json!({ "joints": [] })), of(json!({ "joints": crowd(json!(0), 200_000) }))] {
+        let all = (0..2000).map(|i| file.mesh(&MeshAddress::Node(i % 1000, None)));
+        let fault = all.filter_map(Result::err).next().expect("is too much");
+        assert!(fault.message.contains("MiB more are needed"), "{fault:?}");
+    }
+    // A strip has about as many triangles as indices
+    let mut strip = json!({
+        "asset": { "version": "2.0" },
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1, "mode": 5 }] }],
+        "accessors": [{ "componentType": 5126, "type": "VEC3", "count": 3 },
+            { "componentType": 5121, "type": "SCALAR", "count": 40_000_000 }],
+    });
+    let mesh = |file: &Value| open(file).expect("opens").mesh(&MeshAddress::Mesh(0)).map(|mesh| mesh.triangles.len());
+    assert_eq!(mesh(&strip).map_err(|fault| fault.pointer), Err("/meshes/0/primitives/0".into()));
+    strip["accessors"][1]["count"] = 40.into();
+    assert_eq!(mesh(&strip), Ok(38));
+}

@@ -4,7 +4,7 @@
 
 use std::collections::HashMap;
 
-use super::super::{ModelParts, ModelWarning, clay, material_name, shown, unique};
+use super::super::{ModelParts, ModelWarning, UniqueNames, clay, material_name, shown};
 use super::{ShownModel, no_such};
 use crate::describe::{Channel, ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc};
 use crate::image::read::{Limits, read_header};
@@ -20,20 +20,34 @@ pub(super) struct Materials<'a> {
     /// Names of those that are described, by their numbers; `None` is the material of what has none.
     names: HashMap<(Option<usize>, bool), String>,
     materials: Vec<(String, MaterialDesc)>,
+    material_names: UniqueNames,
     textures: Vec<(String, TextureDesc)>,
-    /// Whether a picture within the file has alpha.
-    alphas: HashMap<usize, bool>,
+    texture_names: UniqueNames,
+    /// The textures by all that parts them, as text.
+    known_textures: HashMap<String, usize>,
+    /// Whether pictures have alpha.
+    alphas: HashMap<PictureAddress, bool>,
     warnings: Vec<ModelWarning>,
 }
 
 /// A texture that a material uses.
 struct Used {
     name: String,
-    /// Whether its picture may have alpha.
-    may_have_alpha: bool,
+    picture: PictureAddress,
+}
+
+/// Where a picture is.
+#[derive(Clone, PartialEq, Eq, Hash)]
+enum PictureAddress {
+    /// In the glTF file: its number there.
+    Inside(usize),
+    /// A file of its own.
+    File(String),
 }
 
 const VARIANTS: &str = "KHR_materials_variants";
+/// The largest picture that is looked at for alpha, in bytes.
+const MAX_PICTURE: u64 = 1 << 30;
 /// How much of the light behind thin glass is seen at most.
 const CLEAREST: f64 = 0.85;
 
@@ -52,7 +66,10 @@ impl<'a> Materials<'a> {
             variant,
             names: HashMap::new(),
             materials: Vec::new(),
+            material_names: UniqueNames::default(),
             textures: Vec::new(),
+            texture_names: UniqueNames::default(),
+            known_textures: HashMap::new(),
             alphas: HashMap::new(),
             warnings: Vec::new(),
         })
@@ -97,9 +114,7 @@ impl<'a> Materials<'a> {
                     ("", None) => "default".to_owned(),
                     (own, _) => own.to_owned(),
                 };
-                let name = unique(material_name(self.shown.file, &own, self.shown.unlit), |name| {
-                    self.materials.iter().any(|(other, _)| other == name)
-                });
+                let name = self.material_names.unique(material_name(self.shown.file, &own, self.shown.unlit));
                 let material = match &at {
                     Some(at) => self.material(at, &own)?,
                     None => clay(has_colors),
@@ -156,7 +171,7 @@ impl<'a> Materials<'a> {
             desc.ior = if ior == 0.0 { 0.0 } else { ior.clamp(1.0, 100.0) };
         }
         if let Some(specular) = at.extension("KHR_materials_specular") {
-            let texture = self.texture(specular.get("specularTexture"))?;
+            let texture = self.texture(specular.get("specularTexture"))?.filter(|used| self.may_have_alpha(used));
             desc.specular = number(specular.number_or("specularFactor", 1.0)?, texture.as_ref(), Channel::A);
             let [r, g, b] = specular.numbers_or("specularColorFactor", [1.0; 3])?;
             let texture = self.texture(specular.get("specularColorTexture"))?;
@@ -222,7 +237,7 @@ impl<'a> Materials<'a> {
         let data = self.texture(old.get("specularGlossinessTexture"))?;
         let glossiness = old.number_or("glossinessFactor", 1.0)?.clamp(0.0, 1.0);
         let roughness = match &data {
-            Some(data) if data.may_have_alpha => {
+            Some(data) if self.may_have_alpha(data) => {
                 NumberParam { texture: Some(data.name.clone()), channel: Channel::A, factor: -glossiness, bias: 1.0 }
             }
             _ => NumberParam::constant(1.0 - glossiness),
@@ -256,7 +271,7 @@ impl<'a> Materials<'a> {
         };
         if mode != AlphaMode::Opaque {
             common.alpha_mode = mode;
-            common.alpha = match base.filter(|base| base.may_have_alpha) {
+            common.alpha = match base.filter(|base| self.may_have_alpha(base)) {
                 Some(base) => NumberParam { factor: alpha, ..NumberParam::channel(&*base.name, Channel::A) },
                 None => NumberParam::constant(alpha),
             };
@@ -290,17 +305,13 @@ impl<'a> Materials<'a> {
         let image = root.of_index("images", &source)?;
         let source = source.index()?;
         let inside = || format!("{}#image/{source}", self.shown.file);
-        let (file, may_have_alpha) = match (image.get("bufferView"), image.text_of("uri")) {
+        let (file, picture) = match (image.get("bufferView"), image.text_of("uri")) {
             (None, Some(uri)) => match Uri::of(uri, self.gltf.folder()) {
-                Uri::Data(_) => (inside(), self.has_alpha(source)),
-                Uri::File(path) => {
-                    let ending = path.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
-                    let is_jpeg = matches!(ending.as_str(), "jpg" | "jpeg");
-                    (path, !is_jpeg)
-                }
-                Uri::Scheme(_) => (uri.to_owned(), true),
+                Uri::Data(_) => (inside(), PictureAddress::Inside(source)),
+                Uri::File(path) => (path.clone(), PictureAddress::File(path)),
+                Uri::Scheme(_) => (uri.to_owned(), PictureAddress::File(uri.to_owned())),
             },
-            _ => (inside(), self.has_alpha(source)),
+            _ => (inside(), PictureAddress::Inside(source)),
         };
         let mut desc = ImageTextureDesc::new(FilePath(file));
         if let Some(sampler) = texture.get("sampler") {
@@ -328,24 +339,33 @@ impl<'a> Materials<'a> {
             set = 0;
         }
         desc.uv_set = (set > 0).then_some(set as u32);
-        let desc = TextureDesc::Image(desc);
-        if let Some((name, _)) = self.textures.iter().find(|(_, other)| *other == desc) {
-            return Ok(Some(Used { name: name.clone(), may_have_alpha }));
+        let known = format!("{desc:?}");
+        if let Some(index) = self.known_textures.get(&known) {
+            return Ok(Some(Used { name: self.textures[*index].0.clone(), picture }));
         }
         let own = [texture.text_of("name"), image.text_of("name")].into_iter().flatten().find(|name| !name.is_empty());
         let own = own.map_or_else(|| format!("texture {}", number.index().unwrap_or(0)), str::to_owned);
-        let name =
-            unique(format!("{}/{own}", self.shown.file), |name| self.textures.iter().any(|(other, _)| other == name));
-        self.textures.push((name.clone(), desc));
-        Ok(Some(Used { name, may_have_alpha }))
+        let name = self.texture_names.unique(format!("{}/{own}", self.shown.file));
+        self.known_textures.insert(known, self.textures.len());
+        self.textures.push((name.clone(), TextureDesc::Image(desc)));
+        Ok(Some(Used { name, picture }))
     }
 
-    /// Whether picture `index`, which the file holds, has alpha; of one that cannot be read it does not matter.
-    fn has_alpha(&mut self, index: usize) -> bool {
-        let gltf = self.gltf;
-        *self.alphas.entry(index).or_insert_with(|| {
-            let bytes = gltf.image(index).ok().flatten().unwrap_or_default();
-            read_header(&bytes, &Limits::default()).is_ok_and(|header| header.has_alpha())
+    /// Whether the picture of a texture may have alpha: of one in a file that cannot be read it is not known.
+    fn may_have_alpha(&mut self, used: &Used) -> bool {
+        let (gltf, assets) = (self.gltf, self.shown.assets);
+        *self.alphas.entry(used.picture.clone()).or_insert_with_key(|picture| {
+            let bytes = match picture {
+                PictureAddress::Inside(index) => Some(gltf.image(*index).ok().flatten().unwrap_or_default()),
+                PictureAddress::File(path) => {
+                    let ending = path.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
+                    if matches!(ending.as_str(), "jpg" | "jpeg") {
+                        return false;
+                    }
+                    assets.read(path, MAX_PICTURE).ok()
+                }
+            };
+            bytes.is_none_or(|bytes| read_header(&bytes, &Limits::default()).is_ok_and(|header| header.has_alpha()))
         })
     }
 }
@@ -381,7 +401,6 @@ fn unclamped_color(factor: [f64; 3], texture: Option<Used>) -> ColorParam {
 fn number(factor: f64, texture: Option<&Used>, channel: Channel) -> NumberParam {
     let factor = factor.clamp(0.0, 1.0);
     match texture {
-        Some(used) if channel == Channel::A && !used.may_have_alpha => NumberParam::constant(factor),
         Some(used) => NumberParam { factor, ..NumberParam::channel(&*used.name, channel) },
         None => NumberParam::constant(factor),
     }

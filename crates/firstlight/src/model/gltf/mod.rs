@@ -11,8 +11,9 @@ mod tests;
 
 use std::collections::HashMap;
 
-use super::{ModelParts, ModelShape, ModelWarning, unique};
+use super::{ModelParts, ModelShape, ModelWarning, UniqueNames};
 use crate::camera::{CameraDesc, Projection};
+use crate::context::Assets;
 use crate::describe::{ColorDesc, FilePath};
 use crate::import::{Gltf, GltfFault, GltfNode, JsonPlace, MeshAddress, Pose};
 use crate::light::{DirectionalDesc, LightDesc, PointDesc, SpotDesc};
@@ -35,10 +36,16 @@ pub(crate) struct ShownModel<'a> {
     pub chosen: &'a dyn Fn(&str) -> Option<String>,
     /// Whether materials show their colours, whatever light there is.
     pub unlit: bool,
+    /// Where pictures come from that lie beside the file.
+    pub assets: &'a dyn Assets,
 }
 
 /// Most instances of all nodes together.
 const MAX_INSTANCES: usize = 1 << 22;
+/// Bytes that a place of a mesh counts for, and the name of each of its materials: less than a file may take for the 12
+/// bytes of a place that is right.
+const PLACE_BYTES: u64 = 256;
+const MATERIAL_BYTES: u64 = 64;
 
 /// What the file describes.
 pub(crate) fn describe(gltf: &Gltf, shown: &ShownModel<'_>) -> Result<ModelParts, GltfFault> {
@@ -54,6 +61,7 @@ pub(crate) fn describe(gltf: &Gltf, shown: &ShownModel<'_>) -> Result<ModelParts
         shared: shared_meshes(gltf, &order)?,
         left_out: vec![false; gltf.root().count("meshes")],
         grouped: HashMap::new(),
+        camera_names: UniqueNames::default(),
         parts,
         placed: 0,
     };
@@ -126,6 +134,7 @@ struct Importer<'a> {
     left_out: Vec<bool>,
     /// The groups of shared meshes.
     grouped: HashMap<usize, String>,
+    camera_names: UniqueNames,
     parts: ModelParts,
     placed: usize,
 }
@@ -183,6 +192,11 @@ impl Importer<'_> {
         if self.placed > MAX_INSTANCES {
             return Err(at.fault(format!("the limit of {MAX_INSTANCES} meshes that nodes show is passed")));
         }
+        // Each place becomes a shape of its own, with its materials unless it is an instance of a group
+        let is_instance = !is_posed && self.shared[mesh];
+        let primitives = if is_instance { 0 } else { shown.count("primitives") };
+        let bytes = PLACE_BYTES.saturating_add(MATERIAL_BYTES.saturating_mul(primitives as u64));
+        self.gltf.take(at, bytes.saturating_mul(places.len() as u64))?;
         let flat = places.iter().filter(|place| !is_invertible(place)).count();
         if flat > 0 {
             let message = format!("{flat} of {name:?} are left out: a scale of 0, or numbers that are none");
@@ -287,9 +301,7 @@ impl Importer<'_> {
                 desc.fov_y_deg = Some(angle.clamp(0.001, 179.99));
             }
         }
-        let taken = |name: &str| self.parts.cameras.iter().any(|(other, _)| other == name);
-        let name = unique(name, taken);
-        self.parts.cameras.push((name, desc));
+        self.parts.cameras.push((self.camera_names.unique(name), desc));
         Ok(())
     }
 }

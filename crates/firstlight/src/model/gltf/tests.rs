@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::{ShownModel, describe};
 use crate::camera::{CameraDesc, Projection};
-use crate::context::AssetError;
+use crate::context::{AssetError, MemoryAssets, NoAssets};
 use crate::describe::{Channel, ColorDesc, ColorParam, NumberParam};
 use crate::import::{Gltf, GltfFault};
 use crate::light::LightDesc;
@@ -34,6 +34,7 @@ const PLAIN: ShownModel<'static> = ShownModel {
     time: None,
     chosen: &|_| None,
     unlit: false,
+    assets: &NoAssets,
 };
 
 fn parts_of(file: Value) -> ModelParts {
@@ -150,7 +151,7 @@ fn alpha_is_that_of_pictures_that_have_one() {
 }
 
 #[test]
-fn pictures_within_the_file_are_looked_at_for_alpha() {
+fn pictures_are_looked_at_for_alpha() {
     let png = |kind: png::ColorType, texel: &[u8]| {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
@@ -173,6 +174,18 @@ fn pictures_within_the_file_are_looked_at_for_alpha() {
         assert_eq!((name.as_str(), picture.file.0.as_str()), ("m/a.gltf/wood", "m/a.gltf#image/0"));
         let MaterialDesc::MetallicRoughness(desc) = &parts.materials[0].1 else { panic!() };
         assert_eq!(desc.common.alpha.texture.is_some(), has_alpha);
+        // In a file of its own
+        let mut file = file_with(json!({
+            "alphaMode": "BLEND", "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } },
+            "extensions": { "KHR_materials_specular": { "specularTexture": { "index": 0 } } },
+        }));
+        file["images"] = json!([{ "uri": "wood.png" }]);
+        let mut assets = MemoryAssets::default();
+        assets.files.insert("m/wood.png".into(), bytes);
+        let shown = ShownModel { assets: &assets, ..PLAIN };
+        let parts = describe(&open(file, &[]), &shown).unwrap_or_else(|fault| panic!("{fault:?}"));
+        let MaterialDesc::MetallicRoughness(desc) = &parts.materials[0].1 else { panic!() };
+        assert_eq!([&desc.common.alpha, &desc.specular].map(|number| number.texture.is_some()), [has_alpha; 2]);
     }
 }
 
@@ -617,4 +630,55 @@ fn extensions_that_are_not_read() {
         needs("VENDOR_x"),
         ": needs the extension VENDOR_x, which is not read; export it without that extension"
     );
+}
+
+/// The same element many times.
+fn crowd(element: Value, count: usize) -> Vec<Value> {
+    std::iter::repeat_n(element, count).collect()
+}
+
+/// Nothing of a file is searched for each of its parts: with that, these would take hours.
+#[test]
+fn crowds_with_one_name_are_described_soon() {
+    const COUNT: usize = 20_000;
+    let start = std::time::Instant::now();
+    let parts = parts_of(json!({
+        "cameras": [{ "type": "perspective", "perspective": { "yfov": 1 } }],
+        "nodes": crowd(json!({ "name": "a", "camera": 0 }), COUNT),
+    }));
+    assert_eq!(parts.cameras.len(), COUNT);
+    assert_eq!(parts.cameras[COUNT - 1].0, format!("a {COUNT}"));
+    let material = |i: usize| {
+        let transform = json!({ "KHR_texture_transform": { "offset": [i, 0] } });
+        json!({ "name": "a", "pbrMetallicRoughness": { "baseColorTexture": { "index": 0, "extensions": transform } } })
+    };
+    let primitive = |i: usize| json!({ "attributes": { "POSITION": 0 }, "material": i });
+    let parts = parts_of(json!({
+        "materials": (0..COUNT).map(material).collect::<Vec<_>>(),
+        "textures": [{ "source": 0, "name": "t" }],
+        "images": [{ "uri": "t.png" }],
+        "meshes": [{ "primitives": (0..COUNT).map(primitive).collect::<Vec<_>>() }],
+        "nodes": [{ "mesh": 0 }],
+    }));
+    assert_eq!((parts.materials.len(), parts.textures.len()), (COUNT, COUNT));
+    assert_eq!(parts.materials[COUNT - 1].0, format!("m/a.gltf/a {COUNT}"));
+    assert_eq!(parts.textures[COUNT - 1].0, format!("m/a.gltf/t {COUNT}"));
+    assert!(start.elapsed() < std::time::Duration::from_secs(20), "{:?}", start.elapsed());
+}
+
+/// A short file that claims a crowd is refused before the crowd is made.
+#[test]
+fn crowds_that_a_file_only_claims_are_refused() {
+    let primitive = json!({ "attributes": { "POSITION": 0 } });
+    let instancing = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": 0 } } });
+    let of = |mesh: Vec<Value>, nodes: Vec<Value>| {
+        let accessors = json!([{ "componentType": 5126, "type": "VEC3", "count": 4_000_000 }]);
+        json!({ "meshes": [{ "primitives": mesh }], "nodes": nodes, "accessors": accessors })
+    };
+    let instances = of(crowd(primitive.clone(), 1), vec![json!({ "mesh": 0, "extensions": instancing })]);
+    let places = of(crowd(primitive, 10_000), crowd(json!({ "mesh": 0, "weights": [1] }), 10_000));
+    for (file, at) in [(instances, "/nodes/0: "), (places, "/nodes/")] {
+        let fault = fault_of(file, &PLAIN);
+        assert!(fault.starts_with(at) && fault.contains("the file claims more than it holds"), "{fault}");
+    }
 }
