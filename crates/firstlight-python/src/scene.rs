@@ -210,6 +210,9 @@ impl PyScene {
                     PyErr::from(std::io::Error::new(error.kind(), format!("{}: {error}", path.display())))
                 };
                 let own = path.canonicalize().map_err(refused)?;
+                if own.is_dir() {
+                    return Err(refused(std::io::ErrorKind::IsADirectory.into()));
+                }
                 let file = path.file_name().unwrap_or_default();
                 let mut known = BTreeMap::new();
                 let called = file.to_string_lossy().into_owned();
