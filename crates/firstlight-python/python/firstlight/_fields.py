@@ -34,13 +34,16 @@ def default(family, kind, field):
 def method(name, family, kind, table, handle):
     """A method of `Scene` that adds things of a kind."""
 
-    def named(self, name, **fields):
+    def added(self, name, fields):
         if fields.get("file") is not None:
             fields["file"] = _models.file_of(self, fields["file"])
         return handle(self, *self._add(family, kind, name, fields))
 
+    def named(self, name, **fields):
+        return added(self, name, fields)
+
     def unnamed(self, **fields):
-        return named(self, "", **fields)
+        return added(self, "", fields)
 
     add = named if family in _NAMED else unnamed
     add.__name__, add.__qualname__ = name, f"Scene.{name}"
@@ -64,7 +67,8 @@ def extend(method, table):
     """Adds the fields of a table to the signature and the docstring of a method, but for those that it has."""
     own = [one for one in signature(method).parameters.values() if one.kind != Parameter.VAR_KEYWORD]
     names = {one.name for one in own}
-    method.__signature__ = Signature([*own, *(one for key, one in _signature("", table).parameters.items() if key not in names | {"self"})])
+    more = [one for key, one in _signature("", table).parameters.items() if key not in names]
+    method.__signature__ = Signature([*own, *more])
     add_to_doc(method, (table, names))
 
 
