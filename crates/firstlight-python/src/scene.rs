@@ -455,16 +455,12 @@ impl PyScene {
     /// The scene as text in TOML. Meshes of arrays stand in it by a name, `memory:` and a hash; lights, ground and
     /// camera of a studio are those that it has in place.
     fn to_toml(&self, py: Python<'_>) -> String {
-        self.with(py, |state| {
-            state.whole().to_toml()
-        })
+        self.with(py, |state| state.whole().to_toml())
     }
 
     /// The scene as text in JSON.
     fn to_json(&self, py: Python<'_>) -> String {
-        self.with(py, |state| {
-            state.whole().to_json()
-        })
+        self.with(py, |state| state.whole().to_json())
     }
 
     /// Renders the scene.
@@ -540,9 +536,7 @@ impl PyScene {
             None if is_in_studio => AaMode::Multisample,
             None => AaMode::Adaptive,
             Some(word) => AaMode::from_name(word).ok_or_else(|| {
-                PyValueError::new_err(format!(
-                    "aa_mode is {word:?}; it is \"adaptive\", \"full\" or \"multisample\""
-                ))
+                PyValueError::new_err(format!("aa_mode is {word:?}; it is \"adaptive\", \"full\" or \"multisample\""))
             })?,
         };
         refuse_framing(has_camera || camera.is_some(), view.is_some(), margin.is_some())?;

@@ -1,6 +1,8 @@
 //! How a scene is shown that lacks lights or a camera: the studio, and where a camera that is found looks from.
 
-use firstlight::{Framing, Parsed, SceneDesc, ShapeDesc, Studio, StudioSettings, UpAxis, View, gltf_animations, is_gltf};
+use firstlight::{
+    Framing, Parsed, SceneDesc, ShapeDesc, Studio, StudioSettings, UpAxis, View, gltf_animations, is_gltf,
+};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -44,7 +46,12 @@ impl Shown {
     /// The settings of the model, where what a call says shows more of it than it does by itself: the time plays its
     /// first animation, and the name of a camera brings its cameras. `is_named`: a camera was named. `None` where it
     /// shows nothing else, `bytes` is what is in the file.
-    pub fn played(&self, plays: bool, is_named: bool, bytes: impl FnOnce() -> Option<Vec<u8>>) -> Option<StudioSettings> {
+    pub fn played(
+        &self,
+        plays: bool,
+        is_named: bool,
+        bytes: impl FnOnce() -> Option<Vec<u8>>,
+    ) -> Option<StudioSettings> {
         let mut studio = self.studio.clone().filter(|_| self.model.is_some() && (plays || is_named))?;
         let bytes = bytes().filter(|bytes| is_gltf(bytes) || bytes.trim_ascii_start().starts_with(b"{"))?;
         if plays && studio.animation.is_none() && !gltf_animations(&bytes).is_empty() {
@@ -165,5 +172,7 @@ pub fn margin(margin: f64) -> PyResult<f64> {
         return Ok(margin);
     }
     let most = Framing::MAX_MARGIN;
-    Err(PyValueError::new_err(format!("margin is {margin}; it is from 0 to {most}, a part of the picture's shorter side")))
+    Err(PyValueError::new_err(format!(
+        "margin is {margin}; it is from 0 to {most}, a part of the picture's shorter side"
+    )))
 }
