@@ -247,7 +247,7 @@ def test_what_is_wrong_is_said(models):
         fl.Scene.from_model("chair.gltf", variant="drak")
     with pytest.raises(FileNotFoundError, match="none.glb"):
         fl.Scene.from_model("none.glb")
-    with pytest.raises(IsADirectoryError):
+    with pytest.raises(OSError, match="is a directory"):
         fl.Scene.from_model(models)
     with pytest.raises(ValueError, match="ground is for studios"):
         fl.Scene().add_model("a.obj", ground=True)

@@ -138,6 +138,10 @@ def test_tensors_of_open3d_are_taken():
     by_face = np.array([[255, 0, 0], [0, 0, 255]], dtype=np.uint8)
     albedo = seen(tensors(triangle={"colors": by_face}))
     assert np.allclose(albedo[27, 32], [0.8, 0, 0]) and np.allclose(albedo[2, 7], [0, 0, 0.8])
+    coat = {"clear_coat": 0.5, "clear_coat_roughness": 0.25, "metallic": 0.5, "roughness": 0.75}
+    kind, fields, _ = fields_of(tensors(scalar_properties=coat, material_name="defaultUnlit"))
+    assert kind == "metallic-roughness" and (fields["clearcoat"], fields["clearcoat_roughness"]) == (0.5, 0.25)
+    assert (fields["metallic"], fields["roughness"]) == (0.5, 0.75)
     lost = told(tensors(texture_maps={"normal": Tensor(PIXELS)}, scalar_properties={"anisotropy": 0.4}))
     assert lost.endswith("not taken: normal texture: there is no texture coordinate for each vertex, anisotropy")
 
@@ -184,7 +188,7 @@ def fields_of(mesh, **fields):
         handle = scene.add(mesh, name="thing", **fields)
     # It can be rendered
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "material.*emits light", fl.SceneWarning)
+        warnings.filterwarnings("ignore", "material.*emits light|camera: no camera ray", fl.SceneWarning)
         scene.render(camera=ABOVE, buffers=["albedo"], **SMALL)
     material = fl._scene.Handle(scene, *scene._find(handle["material"], "material"))
     return material.kind, material.fields, scene
@@ -306,6 +310,16 @@ def test_models_of_open3d_are_taken():
     assert close(frame["metallic"][15, 20], 0.4) and close(frame["roughness"][15, 20], 0.2)
     fields = json.loads(scene._item(*scene._find(handles[0]["material"], "material"))[3])
     assert fields["specular"] == 0.25 and fields["clearcoat"] == 0.5 and fields["normal_map"] and fields["occlusion"]
+    # As files of glTF are read: each has the picture of both; of others each has its own
+    for images, expected in (
+        ({"metallic_img": data, "roughness_img": data.copy()}, [0.8, 0.2]),
+        ({"metallic_img": data[..., 2], "roughness_img": data[..., 1]}, [0.8, 0.2]),
+        ({"metallic_img": data[..., 2], "ao_rough_metal_img": data[..., ::-1]}, [0, 0.2]),
+    ):
+        scene = fl.Scene()
+        scene.add({"geometry": mesh, "material": record(shader="defaultLit", base_metallic=1.0, **images)})
+        frame = scene.render(camera=ABOVE, buffers=["metallic", "roughness"], **SMALL)
+        assert close([frame["metallic"][15, 20], frame["roughness"][15, 20]], expected)
     # The same as dicts, and one geometry with its material
     clear = record(shader="defaultLitTransparency", base_color=[1.0, 0.0, 0.0, 0.25])
     for thing in (

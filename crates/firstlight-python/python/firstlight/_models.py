@@ -481,16 +481,23 @@ def of_tensors(mesh):
         return model
     maps, vectors, scalars = material.texture_maps, material.vector_properties, material.scalar_properties
 
+    def known(table, key):
+        """By its name, or by the one that tensors have for it."""
+        return next((name for name in (key, key.replace("clearcoat", "clear_coat")) if name in table), None)
+
     def texture(key):
-        return maps[key].as_tensor().cpu().numpy() if key in maps else None
+        name = known(maps, key)
+        return None if name is None else maps[name].as_tensor().cpu().numpy()
 
     def vector(key):
         return np.asarray(vectors[key], dtype=np.float64) if key in vectors else None
 
     def scalar(key):
-        return float(scalars[key]) if key in scalars else None
+        name = known(scalars, key)
+        return None if name is None else float(scalars[name])
 
-    shader = str(getattr(material, "material_name", "") or "")
+    # Files are read as "defaultUnlit", whatever is in them
+    shader = str(getattr(material, "material_name", "") or "").replace("Unlit", "Lit")
     model.look = _filament(model, texture, vector, scalar, shader)
     return model
 
@@ -535,9 +542,13 @@ def _filament(model, texture, vector, scalar, shader):
         return Look("unlit", {"color": base_color, **clear})
     both = _taken(model, texture("ao_rough_metal"), "metallic and roughness texture")
     fields = {"base_color": base_color, **clear}
+    own = {key: None if both is not None else texture(key) for key in ("metallic", "roughness")}
+    # Of a file of glTF each is the one picture that has both
+    if own["metallic"] is not None and np.ndim(own["metallic"]) == 3 and np.array_equal(*own.values()):
+        both, own = _taken(model, own["metallic"], "metallic and roughness texture"), dict.fromkeys(own)
     for key, channel, default in (("metallic", "b", 0.0), ("roughness", "g", 1.0)):
-        own = _taken(model, texture(key), f"{key} texture")
-        role, pixels, channel = ("metallic-roughness", both, channel) if own is None else (key, own, "r")
+        alone = _taken(model, own[key], f"{key} texture")
+        role, pixels, channel = ("metallic-roughness", both, channel) if alone is None else (key, alone, "r")
         fields[key] = _from_channel(role, pixels, channel, _number(scalar(key), default))
     normal = _taken(model, texture("normal"), "normal texture")
     if normal is not None:
