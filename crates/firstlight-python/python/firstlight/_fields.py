@@ -63,13 +63,19 @@ def _signature(family, table):
     return Signature(first + needed + [Parameter(key, only, default=field.get("default")) for key, field, _ in others])
 
 
-def extend(method, table):
-    """Adds the fields of a table to the signature and the docstring of a method, but for those that it has."""
-    own = [one for one in signature(method).parameters.values() if one.kind != Parameter.VAR_KEYWORD]
+def extended(function, name, table):
+    """A method of `Scene` that does what a function does, with the fields of a table in its signature and docstring."""
+
+    def add(self, *given, **fields):
+        return function(self, *given, **fields)
+
+    own = [one for one in signature(function).parameters.values() if one.kind != Parameter.VAR_KEYWORD]
     names = {one.name for one in own}
     more = [one for key, one in _signature("", table).parameters.items() if key not in names]
-    method.__signature__ = Signature([*own, *more])
-    add_to_doc(method, (table, names))
+    add.__name__, add.__qualname__ = name, f"Scene.{name}"
+    add.__signature__, add.__doc__ = Signature([*own, *more]), function.__doc__
+    add_to_doc(add, (table, names))
+    return add
 
 
 def _fields(table):

@@ -259,70 +259,6 @@ class Scene(SceneBase):
         """The picture, `[render]` of a scene: width, height, antialiasing, ambient, background, ..."""
         return Handle(self, "render", 0)
 
-    def add_model(
-        self,
-        file,
-        *,
-        studio=None,
-        ground=None,
-        view=None,
-        margin=None,
-        background=None,
-        transparent=None,
-        **fields,
-    ):
-        """Adds a model: all that a glTF, OBJ, PLY or STL file shows, or a mesh or scene of trimesh or Open3D.
-
-        A scene without a camera is given one that sees all of it; `view` and `margin` say how. Without a light it is
-        as dark as its `ambient` is; with `studio` a studio lights all of it, as `use_studio` does.
-
-        Parameters
-        ----------
-        file : path, bytes or open file, or a mesh or scene of trimesh or Open3D
-            In the scene's folder or below it; of a scene without a folder, from the working folder. Of meshes of other
-            packages that is taken which `add` takes.
-        studio : {"soft", "hard", "flat", "clay", "none"}, optional
-            What lights the scene, beside its own lights.
-        ground : bool, optional
-            Whether there is a ground that takes shadows, in a studio.
-        view, margin : optional
-            Of the camera that is found, as `render` takes them.
-        background, transparent : optional
-            Those of `settings`.
-        **fields
-            Those of the list below.
-
-        Returns
-        -------
-        Handle, or a list of them for a scene of trimesh and a model of Open3D
-        """
-        words = {} if studio is None else {"studio": studio, "ground": ground}
-        if studio is None and ground is not None:
-            raise ValueError("ground is for studios: name one, as studio='soft'")
-        shown = self._fields_in(words)
-        content = _models.content_of(file)
-        if content is not None:
-            path = self._give_file(content[0], sha256(content[0]).hexdigest(), f"/{content[1] or 'model'}")
-        elif isinstance(file, (str, os.PathLike)):
-            path = self._find_model(os.path.normpath(os.fspath(file)).replace(os.sep, "/"))
-        else:
-            path, own = None, {"unlit": shown["unlit"], "_material": shown["material"]}
-            of_mesh = {**{key: value for key, value in own.items() if value}, **fields}
-            if of_mesh.get("material") is not None:
-                of_mesh.pop("_material", None)
-            added = self._add_thing(file, of_mesh)
-        if path is not None:
-            fields = {**{key: value for key, value in shown.items() if value}, **fields}
-            added = Handle(self, *self._add("shape", "model", "", {"file": path, **fields}))
-        try:
-            self._use_studio(words, view, margin)
-            given = {"background": background, "transparent": transparent}
-            self.settings.update(**{key: value for key, value in given.items() if value is not None})
-        except BaseException:
-            _models.remove_all(self, added if isinstance(added, list) else [added])
-            raise
-        return added
-
     def add_mesh(self, vertices, faces=None, *, normals=None, uv=None, colors=None, static=False, **fields):
         """Adds a triangle mesh from arrays, of which it keeps one copy; or a mesh of trimesh or Open3D, as `add` does.
 
@@ -561,6 +497,71 @@ def builtin(name):
     return scene
 
 
+def _add_model(
+    self,
+    file,
+    *,
+    studio=None,
+    ground=None,
+    view=None,
+    margin=None,
+    background=None,
+    transparent=None,
+    **fields,
+):
+    """Adds a model: all that a glTF, OBJ, PLY or STL file shows, or a mesh or scene of trimesh or Open3D.
+
+    A scene without a camera is given one that sees all of it; `view` and `margin` say how. Without a light it is
+    as dark as its `ambient` is; with `studio` a studio lights all of it, as `use_studio` does.
+
+    Parameters
+    ----------
+    file : path, bytes or open file, or a mesh or scene of trimesh or Open3D
+        In the scene's folder or below it; of a scene without a folder, from the working folder. Of meshes of other
+        packages that is taken which `add` takes.
+    studio : {"soft", "hard", "flat", "clay", "none"}, optional
+        What lights the scene, beside its own lights.
+    ground : bool, optional
+        Whether there is a ground that takes shadows, in a studio.
+    view, margin : optional
+        Of the camera that is found, as `render` takes them.
+    background, transparent : optional
+        Those of `settings`.
+    **fields
+        Those of the list below.
+
+    Returns
+    -------
+    Handle, or a list of them for a scene of trimesh and a model of Open3D
+    """
+    words = {} if studio is None else {"studio": studio, "ground": ground}
+    if studio is None and ground is not None:
+        raise ValueError("ground is for studios: name one, as studio='soft'")
+    shown = self._fields_in(words)
+    content = _models.content_of(file)
+    if content is not None:
+        path = self._give_file(content[0], sha256(content[0]).hexdigest(), f"/{content[1] or 'model'}")
+    elif isinstance(file, (str, os.PathLike)):
+        path = self._find_model(os.path.normpath(os.fspath(file)).replace(os.sep, "/"))
+    else:
+        path, own = None, {"unlit": shown["unlit"], "_material": shown["material"]}
+        of_mesh = {**{key: value for key, value in own.items() if value}, **fields}
+        if of_mesh.get("material") is not None:
+            of_mesh.pop("_material", None)
+        added = self._add_thing(file, of_mesh)
+    if path is not None:
+        fields = {**{key: value for key, value in shown.items() if value}, **fields}
+        added = Handle(self, *self._add("shape", "model", "", {"file": path, **fields}))
+    try:
+        self._use_studio(words, view, margin)
+        given = {"background": background, "transparent": transparent}
+        self.settings.update(**{key: value for key, value in given.items() if value is not None})
+    except BaseException:
+        _models.remove_all(self, added if isinstance(added, list) else [added])
+        raise
+    return added
+
+
 def _add_methods():
     """One method for each kind of thing that a scene may hold; what it takes are the fields of that kind's table."""
     families = [("shape", SHAPES, ""), ("light", LIGHTS, "_light")]
@@ -573,7 +574,7 @@ def _add_methods():
                 setattr(Scene, name, _fields.method(name, family, kind, tables[family, kind], Handle))
     own = set(tables["shape", "mesh"]["properties"]) - set(_OF_TRIANGLES)
     _fields.add_to_doc(Scene.add_mesh, (tables["shape", "instance"], {"of"}), (tables["shape", "mesh"], own))
-    _fields.extend(Scene.add_model, tables["shape", "model"])
+    setattr(Scene, "add_model", _fields.extended(_add_model, "add_model", tables["shape", "model"]))
     _fields.add_to_doc(Scene.add_camera, (tables["camera", "camera"], ()))
 
 
