@@ -108,11 +108,13 @@ fn warn(py: Python<'_>, text: &str, level: i32) -> PyResult<()> {
 
 /// Sees that a view and a margin are said of scenes without a camera alone.
 fn refuse_framing(has_camera: bool, view: bool, margin: bool) -> PyResult<()> {
-    for (word, _) in [("view", view), ("margin", margin)].iter().filter(|(_, said)| *said && has_camera) {
-        let message = "is for the camera that is found where there is none, and there is one; leave it out";
-        return Err(PyValueError::new_err(format!("{word} {message}, or the camera")));
+    match [("view", view), ("margin", margin)].iter().find(|(_, said)| *said && has_camera) {
+        Some((word, _)) => {
+            let message = "is for the camera that is found where there is none, and there is one; leave it out";
+            Err(PyValueError::new_err(format!("{word} {message}, or the camera")))
+        }
+        None => Ok(()),
     }
-    Ok(())
 }
 
 /// What is said of a thing that is no more.
