@@ -22,6 +22,8 @@ pub enum Source {
 /// The files of a scene.
 pub struct SceneFiles {
     source: Source,
+    /// Folders of models from elsewhere, each with what the names of its files begin with.
+    others: Mutex<Vec<(String, FolderAssets)>>,
     /// The scene's own file.
     own: Option<PathBuf>,
     /// Those that were read, or came with the scene, by their names.
@@ -46,7 +48,7 @@ impl SceneFiles {
 
     /// From a source, and with files that are known already.
     pub fn new(source: Source, own: Option<PathBuf>, known: BTreeMap<String, Arc<[u8]>>) -> Self {
-        SceneFiles { source, own, known: Mutex::new(known) }
+        SceneFiles { source, others: Mutex::default(), own, known: Mutex::new(known) }
     }
 
     fn known(&self) -> MutexGuard<'_, BTreeMap<String, Arc<[u8]>>> {
@@ -63,6 +65,27 @@ impl SceneFiles {
         self.known().insert(name, bytes.into());
     }
 
+    /// What the scene calls the file of a model: of a scene without a folder, `path` leads there from the working
+    /// folder, and the model may read the files of its own folder from then on.
+    pub fn model(&self, path: &str) -> PyResult<String> {
+        if !matches!(self.source, Source::Nothing) || self.known().contains_key(path) {
+            return Ok(path.to_owned());
+        }
+        let file = Path::new(path).file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
+        let prefix = path.strip_suffix(&*file).unwrap_or_default().to_owned();
+        if let Source::Folder(folder) = Source::folder(Path::new(&prefix), &[])? {
+            let mut others = self.others();
+            if others.iter().all(|(other, _)| *other != prefix) {
+                others.push((prefix, folder));
+            }
+        }
+        Ok(path.to_owned())
+    }
+
+    fn others(&self) -> MutexGuard<'_, Vec<(String, FolderAssets)>> {
+        self.others.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Drops those that are in no folder, but for those of these names.
     pub fn retain_in_memory(&self, names: &dyn Fn(&str) -> bool) {
         self.known().retain(|name, _| !name.starts_with(IN_MEMORY) || names(name));
@@ -71,10 +94,10 @@ impl SceneFiles {
     /// Whether the scene was read from the file that `path` leads to.
     pub fn holds(&self, path: &Path) -> bool {
         let Ok(real) = path.canonicalize() else { return false };
-        let read = match &self.source {
-            Source::Nothing => Vec::new(),
-            Source::Folder(folder) => folder.files(),
-        };
+        let mut read: Vec<PathBuf> = self.others().iter().flat_map(|(_, folder)| folder.files()).collect();
+        if let Source::Folder(folder) = &self.source {
+            read.extend(folder.files());
+        }
         read.contains(&real) || self.own.as_ref().is_some_and(|own| *own == real)
     }
 }
@@ -89,7 +112,21 @@ impl Assets for SceneFiles {
             return fits(bytes);
         }
         match &self.source {
-            Source::Nothing => Err(AssetError::NotFound),
+            Source::Nothing => {
+                let others = self.others();
+                let within = others.iter().filter_map(|(prefix, folder)| Some((path.strip_prefix(prefix)?, folder)));
+                let mut read = Err(AssetError::NotFound);
+                for (rest, folder) in within {
+                    read = folder.read(rest, limit);
+                    if !matches!(read, Err(AssetError::NotFound)) {
+                        break;
+                    }
+                }
+                if let Ok(bytes) = &read {
+                    self.known().insert(path.to_owned(), bytes.as_slice().into());
+                }
+                read
+            }
             Source::Folder(folder) => {
                 let bytes = folder.read(path, limit)?;
                 self.known().insert(path.to_owned(), bytes.as_slice().into());

@@ -15,6 +15,7 @@ mod numbers;
 mod pool;
 mod render;
 mod scene;
+mod shown;
 mod state;
 mod value;
 mod wanted;

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use firstlight::{
-    AaMode, Buffer, Compiled, NoAssets, Parsed, RenderSettings, SceneDesc, SceneError as Faults, Window, builtin_scenes,
+    AaMode, Buffer, Compiled, NoAssets, Parsed, RenderSettings, SceneDesc, SceneError as Faults, ShapeDesc, Window,
+    builtin_scenes,
 };
 use numpy::PyArray1;
 use pyo3::exceptions::{PyKeyError, PyMemoryError, PyValueError};
@@ -21,12 +22,16 @@ use crate::item::{Item, get, item_table, names, without_places};
 use crate::meshes::NewMesh;
 use crate::numbers::FAMILIES;
 use crate::render::{PyRender, run};
+use crate::shown::{self, ModelFile, Shown};
 use crate::state::{Refused, State, Wanted};
 use crate::value::tree;
 use crate::{arrays, asked, pool, wanted};
 
 /// No scene text is longer, in bytes.
 const TEXT_LIMIT: u64 = 64 << 20;
+
+/// What makes another scene of the same: its text, files, meshes, and how it is shown.
+type Stored<'py> = (String, Bound<'py, PyDict>, Bound<'py, PyDict>, shown::Pickled<'py>);
 
 /// A scene as `firstlight.Scene` builds on it.
 #[pyclass(subclass, frozen, module = "firstlight._firstlight", name = "SceneBase")]
@@ -101,6 +106,17 @@ fn warn(py: Python<'_>, text: &str, level: i32) -> PyResult<()> {
     PyErr::warn(py, &py.get_type::<SceneWarning>(), &text, level)
 }
 
+/// Sees that a view and a margin are said of scenes without a camera alone.
+fn refuse_framing(has_camera: bool, view: bool, margin: bool) -> PyResult<()> {
+    match [("view", view), ("margin", margin)].iter().find(|(_, said)| *said && has_camera) {
+        Some((word, _)) => {
+            let message = "is for the camera that is found where there is none, and there is one; leave it out";
+            Err(PyValueError::new_err(format!("{word} {message}, or the camera")))
+        }
+        None => Ok(()),
+    }
+}
+
 /// What is said of a thing that is no more.
 fn removed(family: &str) -> PyErr {
     PyKeyError::new_err(format!("the {family} was removed from the scene"))
@@ -172,6 +188,96 @@ impl PyScene {
         }
         // Without the places of a text that nobody wrote
         self.take(py, State::of(Parsed::from(parsed.desc), files))
+    }
+
+    /// Takes a scene over that shows a model: the file at `path`, or that of `files` called `name`. `words` say how.
+    #[pyo3(signature = (path, name, words, folder, files, allow_dirs, view, margin))]
+    #[allow(clippy::too_many_arguments, reason = "they are the arguments of Python")]
+    fn _load_model(
+        &self,
+        py: Python<'_>,
+        path: Option<PathBuf>,
+        name: &str,
+        words: &Bound<'_, PyDict>,
+        folder: Option<PathBuf>,
+        files: Option<BTreeMap<String, Vec<u8>>>,
+        allow_dirs: Vec<PathBuf>,
+        view: Option<&Bound<'_, PyAny>>,
+        margin: Option<f64>,
+    ) -> PyResult<()> {
+        let studio = shown::settings(words)?;
+        let (name, file, files) = match &path {
+            Some(path) => {
+                let refused = |error: std::io::Error| {
+                    PyErr::from(std::io::Error::new(error.kind(), format!("{}: {error}", path.display())))
+                };
+                let own = path.canonicalize().map_err(refused)?;
+                if own.is_dir() {
+                    return Err(refused(std::io::ErrorKind::IsADirectory.into()));
+                }
+                let file = path.file_name().unwrap_or_default();
+                let mut known = BTreeMap::new();
+                let called = file.to_string_lossy().into_owned();
+                // No text can say a name that is not UTF-8
+                if file.to_str().is_none() {
+                    known.insert(called.clone(), std::fs::read(path).map_err(refused)?.into());
+                }
+                let folder = Source::folder(path.parent().unwrap_or(Path::new("")), &allow_dirs)?;
+                (path.display().to_string(), called, SceneFiles::new(folder, Some(own), known))
+            }
+            None => (name.to_owned(), name.to_owned(), SceneFiles::given(folder, files)?),
+        };
+        let mut state = State::of(Parsed::of_model(&name, &file, &studio), files);
+        state.shown = Shown { studio: Some(studio), model: Some(ModelFile { name, file }), ..Shown::default() };
+        state.shown.frame(view, margin)?;
+        self.take(py, state)
+    }
+
+    /// Shows the scene in a studio: its settings become those of the studio, and the materials that it needs are added.
+    /// Answers with fields of the models in it.
+    #[pyo3(signature = (words, view, margin))]
+    fn _use_studio<'py>(
+        &self,
+        py: Python<'py>,
+        words: &Bound<'py, PyDict>,
+        view: Option<&Bound<'py, PyAny>>,
+        margin: Option<f64>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let fields = self._fields_in(py, words)?;
+        let studio = if words.is_empty() { None } else { Some(shown::settings(words)?) };
+        let (mut framed, has_camera) =
+            self.with(py, |state| (state.shown.clone(), !state.parsed.desc.cameras.is_empty()));
+        refuse_framing(has_camera, view.is_some(), margin.is_some())?;
+        framed.frame(view, margin)?;
+        self.with(py, |state| {
+            state.shown.framing = framed.framing;
+            state.change();
+            if let Some(studio) = studio {
+                state.use_studio(studio);
+            }
+        });
+        Ok(fields)
+    }
+
+    /// The fields of models in a studio, without one if `words` is empty.
+    fn _fields_in<'py>(&self, py: Python<'py>, words: &Bound<'py, PyDict>) -> PyResult<Bound<'py, PyDict>> {
+        let fields = PyDict::new(py);
+        let studio = if words.is_empty() { None } else { Some(shown::settings(words)?) };
+        let model = studio.and_then(|studio| SceneDesc::of_model("", &studio).shapes.pop());
+        let (lights, unlit, material) = match model {
+            Some(ShapeDesc::Model(model)) => (model.lights, model.unlit, model.material),
+            _ => (false, false, None),
+        };
+        fields.set_item("lights", lights)?;
+        fields.set_item("unlit", unlit)?;
+        fields.set_item("material", material)?;
+        Ok(fields)
+    }
+
+    /// What the scene calls the file of a model.
+    fn _find_model(&self, py: Python<'_>, path: &str) -> PyResult<String> {
+        let files = self.with(py, |state| state.files.clone());
+        files.model(path)
     }
 
     /// Takes a built-in scene over.
@@ -292,9 +398,10 @@ impl PyScene {
         self.with(py, State::clear);
     }
 
-    /// Keeps the bytes of a picture and answers with the name that stands for it as a file.
-    fn _give_picture(&self, py: Python<'_>, bytes: Vec<u8>, digest: &str) -> String {
-        let name = format!("{IN_MEMORY}{digest}.png");
+    /// Keeps the bytes of a file and answers with the name that stands for it: that of its content, and `name`, which
+    /// begins with `.` or `/`.
+    fn _give_file(&self, py: Python<'_>, bytes: Vec<u8>, digest: &str, name: &str) -> String {
+        let name = format!("{IN_MEMORY}{digest}{name}");
         self.with(py, |state| state.files.give(name.clone(), bytes));
         name
     }
@@ -322,8 +429,8 @@ impl PyScene {
     /// -------
     /// list of Diagnostic
     ///     Warnings and advice.
-    #[pyo3(signature = (*, time = 0.0))]
-    fn check<'py>(&self, py: Python<'py>, time: f64) -> PyResult<Bound<'py, PyList>> {
+    #[pyo3(signature = (*, time = None))]
+    fn check<'py>(&self, py: Python<'py>, time: Option<f64>) -> PyResult<Bound<'py, PyList>> {
         let made = self.with(py, |state| state.compile(&Wanted { time, ..Wanted::default() }));
         let (compiled, _) = made.map_err(|faults| scene_error(py, &faults))?;
         diagnostics(py, &[&compiled.warnings[..], &compiled.advice].concat())
@@ -347,20 +454,15 @@ impl PyScene {
         self.with(py, |state| (state.parsed.desc.render.width, state.parsed.desc.render.height))
     }
 
-    /// The scene as text in TOML. Meshes of arrays stand in it by a name, `memory:` and a hash.
+    /// The scene as text in TOML. Meshes of arrays stand in it by a name, `memory:` and a hash; lights, ground and
+    /// camera of a studio are those that it has in place.
     fn to_toml(&self, py: Python<'_>) -> String {
-        self.with(py, |state| {
-            state.tidy();
-            state.parsed.desc.to_toml()
-        })
+        self.with(py, |state| state.whole().to_toml())
     }
 
     /// The scene as text in JSON.
     fn to_json(&self, py: Python<'_>) -> String {
-        self.with(py, |state| {
-            state.tidy();
-            state.parsed.desc.to_json()
-        })
+        self.with(py, |state| state.whole().to_json())
     }
 
     /// Renders the scene.
@@ -379,13 +481,19 @@ impl PyScene {
     ///     Area lights are integrated, or sampled at so many points.
     /// tolerance : float, optional
     ///     How far a pixel may be off the converged picture, in steps of an 8-bit picture.
-    /// aa_mode : {"adaptive", "full", "multisample"}
+    /// aa_mode : {"adaptive", "full", "multisample"}, optional
     ///     Whether each surface in a pixel is lit as often as it needs, each camera ray by itself, or each smooth part
-    ///     of a surface once.
+    ///     of a surface once. Without it, "multisample" in a studio, and else "adaptive".
     /// crop : tuple of int, optional
     ///     x, y, width and height of the part to render, in pixels from the upper left corner.
-    /// time : float
-    ///     The moment, in seconds, of a scene with keys.
+    /// time : float, optional
+    ///     The moment, in seconds, of a scene with keys; 0 unless said. A model by itself plays its first animation
+    ///     where a time is given, and is at rest otherwise.
+    /// view : str or (float, float), optional
+    ///     Where the camera looks from that is found for a scene without one: "front", "back", "left", "right", "top",
+    ///     "bottom", "iso" or "three-quarter", or azimuth and elevation in degrees.
+    /// margin : float, optional
+    ///     What such a camera leaves free on each side, as a part of the picture's shorter side, 0 to 0.45.
     /// motion_to : float or str or Camera or dict, optional
     ///     Whereto the buffers `motion` and `motion-backward` lead: another moment, in seconds; "next" or "previous",
     ///     the frame after or before this one; one of the scene's cameras, or another one.
@@ -400,7 +508,8 @@ impl PyScene {
     ///     A mapping from the names of the buffers to arrays, row 0 at the top.
     #[pyo3(signature = (
         *, camera = None, width = None, height = None, buffers = None, aa = None, samples = None, tolerance = None,
-        aa_mode = "adaptive", crop = None, time = 0.0, motion_to = None, threads = 0, progress = None
+        aa_mode = None, crop = None, time = None, view = None, margin = None, motion_to = None, threads = 0,
+        progress = None
     ))]
     #[allow(clippy::too_many_arguments, reason = "they are the keyword arguments of Python")]
     fn render(
@@ -413,22 +522,31 @@ impl PyScene {
         aa: Option<u32>,
         samples: Option<&Bound<'_, PyAny>>,
         tolerance: Option<f64>,
-        aa_mode: &str,
+        aa_mode: Option<&str>,
         crop: Option<(u32, u32, u32, u32)>,
-        time: f64,
+        time: Option<f64>,
+        view: Option<&Bound<'_, PyAny>>,
+        margin: Option<f64>,
         motion_to: Option<&Bound<'_, PyAny>>,
         threads: usize,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyRender> {
-        let Some(aa_mode) = AaMode::from_name(aa_mode) else {
-            return Err(PyValueError::new_err(format!(
-                "aa_mode is {aa_mode:?}; it is \"adaptive\", \"full\" or \"multisample\""
-            )));
+        let (is_in_studio, has_camera) =
+            self.with(py, |state| (state.shown.studio.is_some(), !state.parsed.desc.cameras.is_empty()));
+        let aa_mode = match aa_mode {
+            // Nothing is compared with the picture of a model by itself: it is to be there soon
+            None if is_in_studio => AaMode::Multisample,
+            None => AaMode::Adaptive,
+            Some(word) => AaMode::from_name(word).ok_or_else(|| {
+                PyValueError::new_err(format!("aa_mode is {word:?}; it is \"adaptive\", \"full\" or \"multisample\""))
+            })?,
         };
+        refuse_framing(has_camera || camera.is_some(), view.is_some(), margin.is_some())?;
         let crop = crop.map(|(x, y, width, height)| Window { x, y, width, height });
         let threads = NonZeroUsize::new(threads);
         let mut wanted = wanted::wanted(py, camera, [width, height], aa, samples, tolerance, time)?;
         wanted.buffers = buffers.map(wanted::buffers).transpose()?;
+        (wanted.view, wanted.margin) = (view.map(shown::view).transpose()?, margin.map(shown::margin).transpose()?);
         let (choice, there) = match motion_to.map(|to| wanted::motion_choice(py, to, wanted.size)).transpose()? {
             Some((choice, size)) => (Some(choice), size),
             None => (None, [None; 2]),
@@ -463,7 +581,7 @@ impl PyScene {
         py: Python<'py>,
         origins: &Bound<'py, PyAny>,
         directions: &Bound<'py, PyAny>,
-        time: f64,
+        time: Option<f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let rays = asked::rays(origins, directions)?;
         let (compiled, _) = self.compiled(py, &Wanted { time, ..Wanted::default() }, 2)?;
@@ -477,16 +595,16 @@ impl PyScene {
         points: &Bound<'py, PyAny>,
         light: &Bound<'py, PyAny>,
         normals: Option<&Bound<'py, PyAny>>,
-        time: f64,
+        time: Option<f64>,
     ) -> PyResult<Bound<'py, PyArray1<f32>>> {
         let places = asked::places(points, normals)?;
         let (compiled, _) = self.compiled(py, &Wanted { time, ..Wanted::default() }, 2)?;
         asked::visible(py, &compiled.scene, &places, light)
     }
 
-    /// All that makes another scene of the same: its text, its files, its meshes.
-    fn _state<'py>(&self, py: Python<'py>) -> PyResult<(String, Bound<'py, PyDict>, Bound<'py, PyDict>)> {
-        let (text, files, meshes) = self.with(py, |state| {
+    /// All that makes another scene of the same: its text, its files, its meshes, and how it is shown.
+    fn _state<'py>(&self, py: Python<'py>) -> PyResult<Stored<'py>> {
+        let (text, files, meshes, shown) = self.with(py, |state| {
             use firstlight::Assets;
             state.tidy();
             let (mut meshes, mut desc) = (Vec::new(), state.parsed.desc.clone());
@@ -502,7 +620,7 @@ impl PyScene {
                 let pictures = parts.files_mut().filter(|file| !file.0.contains('#'));
                 pictures.for_each(|file| drop(state.files.read(&file.0, u64::MAX)));
             }
-            (state.parsed.desc.to_json(), state.files.all(), meshes)
+            (state.parsed.desc.to_json(), state.files.all(), meshes, state.shown.clone())
         });
         let (by_name, of_meshes) = (PyDict::new(py), PyDict::new(py));
         for (name, bytes) in files {
@@ -511,7 +629,7 @@ impl PyScene {
         for (name, mesh) in meshes {
             of_meshes.set_item(name, arrays::stored(py, &mesh)?)?;
         }
-        Ok((text, by_name, of_meshes))
+        Ok((text, by_name, of_meshes, shown.pickled(py)?))
     }
 
     /// Becomes the scene of such a state.
@@ -521,14 +639,18 @@ impl PyScene {
         text: &str,
         files: BTreeMap<String, Vec<u8>>,
         meshes: &Bound<'_, PyDict>,
+        shown: shown::Pickled<'_>,
     ) -> PyResult<()> {
+        let shown = Shown::restored(shown)?;
         let known = files.into_iter().map(|(name, bytes)| (name, bytes.into())).collect();
         let files = SceneFiles::new(Source::Nothing, None, known);
         let parsed = SceneDesc::parse("scene.json", text.as_bytes(), &files);
         if !parsed.faults().is_empty() {
             return Err(scene_error(py, &Faults { faults: parsed.faults().to_vec() }));
         }
-        let state = State::of(Parsed::from(parsed.desc), files);
+        let of_model = shown.studio.as_ref().and_then(|studio| shown.with(&parsed.desc, studio));
+        let mut state = State::of(of_model.unwrap_or_else(|| Parsed::from(parsed.desc)), files);
+        state.shown = shown;
         for (_, mesh) in meshes.iter() {
             let mesh = arrays::restored(mesh.cast::<PyDict>()?)?;
             if !mesh.faults().is_empty() {

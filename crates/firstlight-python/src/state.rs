@@ -1,21 +1,24 @@
 //! What changes of a scene: its description, compiled again only where a call wants it otherwise than the last.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use firstlight::{
-    BufferDesc, CameraDesc, CompileCache, CompileOptions, Compiled, GroupDesc, MotionTo, Parsed, RenderDesc,
-    SamplesDesc, SceneDesc, SceneError as Faults, ShapeDesc,
+    Assets, BufferDesc, CameraDesc, CompileCache, CompileOptions, Compiled, GroupDesc, MotionTo, Parsed, RenderDesc,
+    SamplesDesc, SceneDesc, SceneError as Faults, ShapeDesc, StudioSettings, View,
 };
 
 use crate::files::{IN_MEMORY, SceneFiles};
 use crate::item::{Item, get, push, remove, set};
 use crate::numbers::Numbers;
 use crate::pool::in_pool;
+use crate::shown::Shown;
 
 /// What changes of a scene.
 pub struct State {
     pub parsed: Parsed,
+    pub shown: Shown,
     pub files: Arc<SceneFiles>,
     pub cache: CompileCache,
     pub numbers: Numbers,
@@ -39,7 +42,11 @@ pub struct Wanted {
     pub tolerance: Option<f64>,
     pub buffers: Option<Vec<BufferDesc>>,
     pub motion_to: Option<MotionChoice>,
-    pub time: f64,
+    /// The moment, if one is asked for: of a model by itself it plays the first animation.
+    pub time: Option<f64>,
+    /// Where a camera that is found looks from, and its margin.
+    pub view: Option<View>,
+    pub margin: Option<f64>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -58,7 +65,8 @@ impl State {
     /// Of a description, and its files.
     pub fn of(parsed: Parsed, files: SceneFiles) -> Self {
         let (files, cache, numbers) = (Arc::new(files), CompileCache::default(), Numbers::of(&parsed.desc));
-        State { parsed, files, cache, numbers, told: BTreeSet::new(), is_untidy: false, changes: 0, compiled: None }
+        let (shown, told) = (Shown::default(), BTreeSet::new());
+        State { parsed, shown, files, cache, numbers, told, is_untidy: false, changes: 0, compiled: None }
     }
 
     /// The scene as it is wanted.
@@ -100,14 +108,64 @@ impl State {
             desc.render.samples = samples;
             desc.lights.iter_mut().for_each(|light| light.set_samples(samples));
         }
-        let options =
-            CompileOptions { time: wanted.time, cache: Some(self.cache.clone()), ..CompileOptions::default() };
-        let compiled = in_pool(|| self.parsed.compile(&*self.files, &options));
+        let mut framing = self.shown.framing;
+        framing.view = wanted.view.unwrap_or(framing.view);
+        framing.margin = wanted.margin.unwrap_or(framing.margin);
+        let played = self.played(wanted);
+        let other = played.as_ref().and_then(|studio| self.shown.with(&self.parsed.desc, studio));
+        let options = CompileOptions {
+            time: wanted.time.unwrap_or(0.0),
+            framing,
+            studio: played.or_else(|| self.shown.studio.clone()),
+            cache: Some(self.cache.clone()),
+            ..CompileOptions::default()
+        };
+        let compiled = in_pool(|| other.as_ref().unwrap_or(&self.parsed).compile(&*self.files, &options));
         let desc = &mut self.parsed.desc;
         (desc.render, desc.cameras, desc.lights) = before;
         let compiled = Arc::new(compiled?);
         self.compiled = Some((self.changes, wanted.clone(), compiled.clone()));
         Ok((compiled, true))
+    }
+
+    /// Shows the scene in a studio: the settings of its picture become those of the studio, and the materials that the
+    /// studio needs are added.
+    pub fn use_studio(&mut self, studio: StudioSettings) {
+        let made = SceneDesc::of_model("", &studio);
+        let render = &mut self.parsed.desc.render;
+        (render.background, render.tolerance) = (made.render.background, made.render.tolerance);
+        (render.ambient, render.display) = (made.render.ambient, made.render.display);
+        for (name, material) in made.materials {
+            if self.numbers.named("material", &name).is_none() {
+                self.add(Item::Material(name, material));
+            }
+        }
+        // Of a model by itself it is another way to show it
+        self.parsed = Parsed::from(std::mem::take(&mut self.parsed.desc));
+        (self.shown.studio, self.shown.model) = (Some(studio), None);
+        self.change();
+    }
+
+    /// The settings of a model by itself of which a call shows more than it does otherwise.
+    fn played(&self, wanted: &Wanted) -> Option<StudioSettings> {
+        let is_named = matches!(wanted.camera, Some(CameraChoice::Named(_)));
+        let read = || self.files.read(&self.shown.model.as_ref()?.file, u64::MAX).ok();
+        self.shown.played(wanted.time.is_some(), is_named, read)
+    }
+
+    /// The description as text is to have it: with the lights, the ground and the camera of a scene that is shown in
+    /// some way that a text cannot say.
+    pub fn whole(&mut self) -> Cow<'_, SceneDesc> {
+        self.tidy();
+        let is_plain = self.shown == Shown::default();
+        match if is_plain { None } else { self.compile(&Wanted::default()).ok() } {
+            Some((compiled, _)) => {
+                let mut desc = self.parsed.desc.clone();
+                compiled.added.add_to(&mut desc);
+                Cow::Owned(desc)
+            }
+            None => Cow::Borrowed(&self.parsed.desc),
+        }
     }
 
     /// Forgets what was compiled, so that the next call is told its warnings.
@@ -166,6 +224,8 @@ impl State {
         let render = self.parsed.desc.render.clone();
         let render = RenderDesc { camera: None, motion_to: render.motion_to.clone().filter(named), ..render };
         self.parsed.desc = SceneDesc { render, ..SceneDesc::default() };
+        // A studio is made of lights and materials
+        self.shown = Shown { framing: self.shown.framing, ..Shown::default() };
         self.numbers.clear();
         self.removed();
     }

@@ -19,7 +19,7 @@ pub fn wanted(
     antialiasing: Option<u32>,
     samples: Option<&Bound<'_, PyAny>>,
     tolerance: Option<f64>,
-    time: f64,
+    time: Option<f64>,
 ) -> PyResult<Wanted> {
     let camera = camera.map(|camera| camera_choice(py, "camera", camera, &mut size)).transpose()?;
     let samples = match samples {

@@ -1,5 +1,7 @@
 """Meshes of trimesh and Open3D, by light stand-ins with the fields of the real ones (`large` has those themselves)."""
 
+import io
+import json
 import types
 import warnings
 
@@ -136,8 +138,12 @@ def test_tensors_of_open3d_are_taken():
     by_face = np.array([[255, 0, 0], [0, 0, 255]], dtype=np.uint8)
     albedo = seen(tensors(triangle={"colors": by_face}))
     assert np.allclose(albedo[27, 32], [0.8, 0, 0]) and np.allclose(albedo[2, 7], [0, 0, 0.8])
-    lost = told(tensors(texture_maps={"normal": Tensor(PIXELS)}, scalar_properties={"roughness": 0.4}))
-    assert lost.endswith("not taken: normal texture, roughness factor")
+    coat = {"clear_coat": 0.5, "clear_coat_roughness": 0.25, "metallic": 0.5, "roughness": 0.75}
+    kind, fields, _ = fields_of(tensors(scalar_properties=coat, material_name="defaultUnlit"))
+    assert kind == "metallic-roughness" and (fields["clearcoat"], fields["clearcoat_roughness"]) == (0.5, 0.25)
+    assert (fields["metallic"], fields["roughness"]) == (0.5, 0.75)
+    lost = told(tensors(texture_maps={"normal": Tensor(PIXELS)}, scalar_properties={"anisotropy": 0.4}))
+    assert lost.endswith("not taken: normal texture: there is no texture coordinate for each vertex, anisotropy")
 
 
 def test_base_colours_are_taken():
@@ -159,24 +165,209 @@ def test_base_colours_are_taken():
 
 
 def test_what_is_not_taken_is_one_warning_with_the_name():
-    material = pbr(
-        baseColorTexture=Image(np.dstack([PIXELS, np.full((2, 2), 9, dtype=np.uint8)])),
-        metallicFactor=1.0,
-        roughnessFactor=0.5,
-        normalTexture=Image(PIXELS),
-    )
-    assert told(trimesh(kind="texture", uv=UV, material=material), name="chair") == (
-        "the mesh 'chair': not taken: alpha of its texture, metallic factor, roughness factor, normal texture"
+    floats = pbr(normalTexture=PIXELS / 255, occlusionTexture=PIXELS[..., 0] / 255)
+    assert told(trimesh(kind="texture", uv=UV, material=floats), name="chair") == (
+        "the mesh 'chair': not taken: normal texture: it is no picture of bytes, occlusion texture: it is no picture "
+        "of bytes"
     )
     assert "no texture coordinate" in told(trimesh(kind="texture", uv=None, material=pbr(baseColorTexture=PIXELS)))
     several = types.SimpleNamespace(materials=[pbr(), pbr()])
     assert "2 materials of one mesh" in told(trimesh(kind="texture", uv=UV, material=several))
-    shiny = types.SimpleNamespace(image=None, diffuse=None, specular=np.array([255, 255, 255, 255], dtype=np.uint8))
-    assert told(trimesh(kind="texture", material=shiny), name=None).startswith("a mesh without a name: not taken: spec")
     floats = open3d(triangle_uvs=UV[HALVES.ravel()], textures=[PIXELS / 255])
     assert "no picture of bytes" in told(floats)
-    # What asks for nothing is not lost
-    seen(trimesh(kind="texture", material=pbr(metallicFactor=0.0, roughnessFactor=1.0)))
+    # Alpha of a material that is opaque says nothing
+    clear = np.dstack([PIXELS, np.full((2, 2), 9, dtype=np.uint8)])
+    assert shows(seen(trimesh(kind="texture", uv=UV, material=pbr(baseColorTexture=Image(clear)))))
+
+
+def fields_of(mesh, **fields):
+    """The material that a mesh brings, without a warning."""
+    scene = fl.Scene()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        handle = scene.add(mesh, name="thing", **fields)
+    # It can be rendered
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "material.*emits light|camera: no camera ray", fl.SceneWarning)
+        scene.render(camera=ABOVE, buffers=["albedo"], **SMALL)
+    material = fl._scene.Handle(scene, *scene._find(handle["material"], "material"))
+    return material.kind, material.fields, scene
+
+
+def close(value, expected):
+    return np.allclose(value, expected, atol=1e-6)
+
+
+def test_materials_of_gltf_are_taken():
+    data = np.zeros((2, 2, 3), dtype=np.uint8)
+    data[..., 1], data[..., 2] = 51, 204
+    material = pbr(
+        baseColorTexture=Image(np.dstack([PIXELS, np.full((2, 2), 128, dtype=np.uint8)])),
+        baseColorFactor=np.array([255, 255, 255, 51], dtype=np.uint8),
+        metallicFactor=0.5,
+        roughnessFactor=0.5,
+        metallicRoughnessTexture=Image(data),
+        normalTexture=PIXELS,
+        occlusionTexture=PIXELS[..., 0],
+        emissiveTexture=PIXELS,
+        emissiveFactor=[0.5, 0.25, 0.0],
+        alphaMode="MASK",
+        alphaCutoff=0.25,
+        doubleSided=True,
+    )
+    mesh = trimesh(kind="texture", uv=UV, material=material)
+    kind, fields, scene = fields_of(mesh)
+    assert kind == "metallic-roughness"
+    both = fields["metallic"]["texture"]
+    assert fields["metallic"] == {"texture": both, "channel": "b", "factor": 0.5}
+    # Green is what a number takes of a texture unless it says otherwise
+    assert fields["roughness"]["texture"] == both and fields["roughness"].get("channel", "g") == "g"
+    assert fields["alpha"] == {"texture": "thing", "channel": "a", "factor": 0.2}
+    assert (fields["alpha_mode"], fields["cutoff"]) == ("mask", 0.25) and "single_sided" not in fields
+    assert fields["normal_map"] == "thing normal" and fields["occlusion"]["texture"] == "thing occlusion"
+    assert fields["emissive"]["texture"] == "thing emission" and fields["emissive"]["factor"][:2] == [0.5, 0.25]
+    material.alphaMode = None
+    frame = fields_of(mesh)[2].render(camera=ABOVE, buffers=["metallic", "roughness", "albedo"], **SMALL)
+    assert close(frame["metallic"][15, 20], 0.4) and close(frame["roughness"][15, 20], 0.1)
+    # What a file of glTF does not say
+    kind, fields, scene = fields_of(trimesh(kind="texture", material=pbr(doubleSided=False)))
+    frame = scene.render(camera=ABOVE, buffers=["metallic", "roughness"], **SMALL)
+    assert close(frame["metallic"][15, 20], 1) and close(frame["roughness"][15, 20], 1)
+    assert fields["single_sided"] is True
+    bright = pbr(emissiveFactor=[4.0, 1.0, 0.0])
+    kind, fields, scene = fields_of(trimesh(kind="texture", material=bright))
+    assert fields["emissive_strength"] == 4
+    color = scene.render(camera=ABOVE, buffers=["emission"], **SMALL)["emission"][15, 20]
+    assert close(color[:3], [4, 1, 0])
+
+
+def test_materials_of_obj_files_are_taken():
+    byte = lambda *c: np.array(c, dtype=np.uint8)  # noqa: E731
+    shiny = types.SimpleNamespace(
+        image=None, diffuse=byte(188, 0, 0, 255), specular=byte(255, 255, 255, 255), glossiness=50.0
+    )
+    kind, fields, _ = fields_of(trimesh(kind="texture", material=shiny))
+    assert kind == "phong" and close(fields["diffuse"], [HALF, 0, 0])
+    assert close(fields["specular"], [1, 1, 1]) and fields["shininess"] == 50
+    clear = types.SimpleNamespace(image=None, diffuse=byte(188, 0, 0, 51))
+    kind, fields, _ = fields_of(trimesh(kind="texture", material=clear))
+    assert (fields["alpha"], fields["alpha_mode"]) == (0.2, "blend")
+    leaf = types.SimpleNamespace(image=Image(np.dstack([PIXELS, np.full((2, 2), 51, dtype=np.uint8)])), diffuse=None)
+    kind, fields, scene = fields_of(trimesh(kind="texture", uv=UV, material=leaf))
+    assert fields["alpha"]["texture"] == fields["diffuse"]["texture"] and fields["alpha"]["channel"] == "a"
+    opacity = scene.render(camera=ABOVE, buffers=["opacity"], **SMALL)["opacity"]
+    assert close(opacity[15, 20], 0.2)
+
+
+def record(**fields):
+    """A `MaterialRecord` as it is made."""
+    images = ("albedo", "normal", "ao", "metallic", "roughness", "reflectance", "clearcoat", "clearcoat_roughness")
+    images += ("anisotropy", "ao_rough_metal")
+    own = {
+        **{f"{name}_img": None for name in images},
+        "shader": "defaultUnlit",
+        "base_color": [1.0, 1.0, 1.0, 1.0],
+        "base_metallic": 0.0,
+        "base_roughness": 1.0,
+        "base_reflectance": 0.5,
+        "base_clearcoat": 0.0,
+        "base_clearcoat_roughness": 0.0,
+        "base_anisotropy": 0.0,
+        "emissive_color": [0.0, 0.0, 0.0, 0.0],
+        "has_alpha": False,
+    }
+    return types.SimpleNamespace(**{**own, **fields})
+
+
+def test_models_of_open3d_are_taken():
+    mesh = open3d(triangle_uvs=UV[HALVES.ravel()], textures=[])
+    data = np.zeros((2, 2, 3), dtype=np.uint8)
+    data[..., 1], data[..., 2] = 51, 204
+    lit = record(
+        shader="defaultLit",
+        albedo_img=PIXELS,
+        base_color=[0.5, 0.5, 0.5, 1.0],
+        ao_rough_metal_img=data,
+        base_metallic=0.5,
+        normal_img=PIXELS,
+        ao_img=PIXELS[..., 0],
+        base_reflectance=0.25,
+        base_clearcoat=0.5,
+    )
+    model = types.SimpleNamespace(
+        meshes=[types.SimpleNamespace(mesh=mesh, mesh_name=name, material_idx=0) for name in ("seat", "seat")],
+        materials=[lit],
+    )
+    scene = fl.Scene()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        handles = scene.add(model, name="chair")
+        frame = scene.render(camera=ABOVE, buffers=["albedo", "metallic", "roughness"], **SMALL)
+    assert [handle.name for handle in handles] == ["chair/seat", "chair/seat-2"]
+    # One material for both
+    assert dict(scene._counts())["material"] == 1
+    assert shows(frame["albedo"], factor=0.5)
+    assert close(frame["metallic"][15, 20], 0.4) and close(frame["roughness"][15, 20], 0.2)
+    fields = json.loads(scene._item(*scene._find(handles[0]["material"], "material"))[3])
+    assert fields["specular"] == 0.25 and fields["clearcoat"] == 0.5 and fields["normal_map"] and fields["occlusion"]
+    # As files of glTF are read: each has the picture of both; of others each has its own
+    for images, expected in (
+        ({"metallic_img": data, "roughness_img": data.copy()}, [0.8, 0.2]),
+        ({"metallic_img": data[..., 2], "roughness_img": data[..., 1]}, [0.8, 0.2]),
+        ({"metallic_img": data[..., 2], "ao_rough_metal_img": data[..., ::-1]}, [0, 0.2]),
+    ):
+        scene = fl.Scene()
+        scene.add({"geometry": mesh, "material": record(shader="defaultLit", base_metallic=1.0, **images)})
+        frame = scene.render(camera=ABOVE, buffers=["metallic", "roughness"], **SMALL)
+        assert close([frame["metallic"][15, 20], frame["roughness"][15, 20]], expected)
+    # The same as dicts, and one geometry with its material
+    clear = record(shader="defaultLitTransparency", base_color=[1.0, 0.0, 0.0, 0.25])
+    for thing in (
+        {"meshes": [{"mesh": mesh, "mesh_name": "a", "material_idx": 0}], "materials": [clear]},
+        {"name": "a", "geometry": mesh, "material": clear},
+    ):
+        scene = fl.Scene()
+        (handle,) = scene.add(thing)
+        assert handle.name == "a"
+        assert close(scene.render(camera=ABOVE, buffers="opacity", **SMALL)["opacity"][15, 20], 0.25)
+    scene = fl.Scene()
+    scene.add({"geometry": mesh, "material": record(base_color=[0.0, 0.5, 0.0, 1.0])})
+    assert close(scene.render(camera=ABOVE, **SMALL)["color"][15, 20], [0, 0.5, 0, 1])
+    with pytest.raises(TypeError, match="a mesh of the model is a NoneType"):
+        fl.Scene().add({"meshes": [{}], "materials": []})
+
+
+def test_nodes_share_the_material_of_their_mesh():
+    image = types.SimpleNamespace(image=PIXELS, diffuse=None)
+    square = trimesh(kind="texture", uv=UV, material=image)
+    scene = fl.Scene()
+    scene.add(graph({f"node {i}": (np.eye(4), "square") for i in range(3)}, {"square": square}))
+    counts = dict(scene._counts())
+    assert (counts["shape"], counts["material"], counts["texture"]) == (3, 1, 1)
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_textures_are_arrays_pictures_and_bytes(kind):
+    most = np.iinfo(kind).max
+    gray = np.array([[0.0, 0.25], [0.5, 1.0]])
+    pictures = {"array": (gray * most).astype(kind), "channel": (gray * most).astype(kind)[..., None]}
+    pictures["color"] = np.repeat(pictures["channel"], 3, axis=2)
+    from firstlight._models import png
+
+    pictures["bytes"] = png(pictures["color"])
+    pictures["file"] = io.BytesIO(pictures["bytes"])
+    for name, picture in pictures.items():
+        scene = fl.Scene()
+        scene.add_image_texture("gray", file=picture, color_space="raw", filter="nearest")
+        scene.add_unlit_material("m", color={"texture": "gray"})
+        scene.add_mesh(SQUARE, HALVES, uv=UV, material="m")
+        albedo = scene.render(camera=ABOVE, buffers="albedo", **SMALL)["albedo"]
+        texels = [albedo[y, x, 0] for y in (7, 22) for x in (12, 27)]
+        assert np.allclose(texels, gray.ravel(), atol=1 / 255), name
+    with pytest.raises(ValueError, match=r"an array of shape \(2, 2\) and float64; a picture is"):
+        fl.Scene().add_image_texture("gray", file=gray)
+    with pytest.raises(TypeError, match="open it as 'rb'"):
+        fl.Scene().add_image_texture("gray", file=io.StringIO("x"))
 
 
 def ball(welded):

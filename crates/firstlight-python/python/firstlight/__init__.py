@@ -1,8 +1,9 @@
 """Direct light, without noise, with the same bits on every machine.
 
-A scene is read (`Scene.from_file`, `Scene.from_text`, `Scene.from_dict`, `builtin`) or built (`Scene()`, `add_mesh`,
-`add_sphere`, `add_rectangle_light`, ...), and rendered to numpy arrays (`Scene.render`, `Scene.render_many`). Without
-a picture it says what rays meet (`Scene.cast`) and what points see of a light (`Scene.visible`).
+A scene is read (`Scene.from_file`, `Scene.from_text`, `Scene.from_dict`, `builtin`), shows a model by itself
+(`Scene.from_model`), or is built (`Scene()`, `add_mesh`, `add_sphere`, `add_rectangle_light`, ...), and is rendered to
+numpy arrays (`Scene.render`, `Scene.render_many`). Without a picture it says what rays meet (`Scene.cast`) and what
+points see of a light (`Scene.visible`).
 
 Lengths are in metres, angles in degrees, colours linear Rec. 709. y is up, axes are right-handed, row 0 of an array is
 the top of the picture.

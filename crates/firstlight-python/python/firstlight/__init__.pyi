@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypedDict, final, overload
+from typing import IO, Any, Literal, TypedDict, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,6 +34,15 @@ Transform = ArrayLike | Mapping[str, Any] | None
 # Linear [r, g, b], "#rrggbb", "#rgb" or a name of CSS in sRGB, or a gray
 Color = Sequence[float] | NDArray[Any] | str | float
 Vector = Sequence[float] | NDArray[Any]
+# Where a camera that is found looks from: by name, or azimuth and elevation in degrees
+View = (
+    Literal["front", "back", "left", "right", "side", "top", "bottom", "iso", "three-quarter"]
+    | tuple[float, float]
+    | Sequence[float]
+)
+Studio = Literal["soft", "hard", "flat", "clay", "none"]
+# The bytes of a file, or one that is open
+Content = bytes | bytearray | memoryview | IO[bytes]
 # A colour or a number, or {"texture": NAME, "factor": ...}
 ColorParam = Color | Mapping[str, Any]
 NumberParam = float | Mapping[str, Any]
@@ -268,6 +277,37 @@ class Scene:
     def from_dict(
         cls, tree: dict[str, Any], *, assets: str | os.PathLike[str] | Mapping[str, bytes] | None = None
     ) -> Scene: ...
+    @classmethod
+    def from_model(
+        cls,
+        model: str | os.PathLike[str] | Content | Any,
+        *,
+        studio: Studio = "soft",
+        ground: bool | None = None,
+        view: View | None = None,
+        margin: float | None = None,
+        up: Literal["y", "z"] | None = None,
+        smooth_deg: float | None = None,
+        variant: str | None = None,
+        scene: int | None = None,
+        animation: str | int | None = None,
+        name: str | None = None,
+        assets: str | os.PathLike[str] | Mapping[str, bytes] | None = None,
+        allow_dirs: Sequence[str | os.PathLike[str]] = (),
+        width: int | None = None,
+        height: int | None = None,
+        background: Color | None = None,
+        transparent: bool | None = None,
+        **settings: Any,
+    ) -> Scene: ...
+    def use_studio(
+        self,
+        studio: Studio = "soft",
+        *,
+        ground: bool | None = None,
+        view: View | None = None,
+        margin: float | None = None,
+    ) -> None: ...
     def __getitem__(self, name: str) -> Handle: ...
     def __delitem__(self, name: str) -> None: ...
     def __contains__(self, name: str) -> bool: ...
@@ -280,7 +320,7 @@ class Scene:
     def size(self) -> tuple[int, int]: ...
     @property
     def bounds(self) -> list[list[float]] | None: ...
-    def check(self, *, time: float = 0.0) -> list[Diagnostic]: ...
+    def check(self, *, time: float | None = None) -> list[Diagnostic]: ...
     def to_toml(self) -> str: ...
     def to_json(self) -> str: ...
     def render(
@@ -293,9 +333,11 @@ class Scene:
         aa: int | None = None,
         samples: Literal["exact"] | int | None = None,
         tolerance: float | None = None,
-        aa_mode: Literal["adaptive", "full", "multisample"] = "adaptive",
+        aa_mode: Literal["adaptive", "full", "multisample"] | None = None,
         crop: tuple[int, int, int, int] | None = None,
-        time: float = 0.0,
+        time: float | None = None,
+        view: View | None = None,
+        margin: float | None = None,
         motion_to: float | str | Camera | dict[str, Any] | None = None,
         threads: int = 0,
         progress: Callable[[int, int], object] | None = None,
@@ -308,9 +350,9 @@ class Scene:
         workers: int | None = None,
         **options: Any,
     ) -> Iterator[Render]: ...
-    def cast(self, origins: ArrayLike, directions: ArrayLike, *, time: float = 0.0) -> Hits: ...
+    def cast(self, origins: ArrayLike, directions: ArrayLike, *, time: float | None = None) -> Hits: ...
     def visible(
-        self, points: ArrayLike, *, light: str | int, normals: ArrayLike | None = None, time: float = 0.0
+        self, points: ArrayLike, *, light: str | int, normals: ArrayLike | None = None, time: float | None = None
     ) -> NDArray[np.float32]: ...
     def add(self, thing: Any, **fields: Unpack[_MeshFields]) -> Handle | list[Handle]: ...
     def remove(
@@ -322,8 +364,8 @@ class Scene:
     def clear(self) -> None: ...
     def add_mesh(
         self,
-        vertices: ArrayLike,
-        faces: ArrayLike,
+        vertices: ArrayLike | Any,
+        faces: ArrayLike | None = None,
         *,
         normals: ArrayLike | None = None,
         uv: ArrayLike | None = None,
@@ -351,7 +393,7 @@ class Scene:
         self,
         name: str,
         *,
-        file: str,
+        file: str | os.PathLike[str] | Content | NDArray[Any] | Any,
         wrap: Sequence[Any] = ...,
         filter: Literal["nearest", "bilinear", "trilinear", "anisotropic"] = ...,
         color_space: Literal["srgb", "raw"] | None = ...,
@@ -493,7 +535,7 @@ class Scene:
     def add_point_set(
         self,
         *,
-        file: str | None = ...,
+        file: str | os.PathLike[str] | Content | None = ...,
         positions: Sequence[Any] = ...,
         radii: Vector = ...,
         colors: Sequence[Any] = ...,
@@ -508,8 +550,14 @@ class Scene:
     ) -> Handle: ...
     def add_model(
         self,
+        file: str | os.PathLike[str] | Content | Any,
         *,
-        file: str,
+        studio: Studio | None = None,
+        ground: bool | None = None,
+        view: View | None = None,
+        margin: float | None = None,
+        background: Color | None = None,
+        transparent: bool | None = None,
         up: Literal["y", "z"] | None = ...,
         materials: Mapping[str, str] = ...,
         variant: str | None = ...,
@@ -521,7 +569,7 @@ class Scene:
         smooth_deg: float | None = ...,
         unlit: bool = ...,
         **fields: Unpack[_ShapeFields],
-    ) -> Handle: ...
+    ) -> Handle | list[Handle]: ...
     def add_point_light(
         self,
         *,

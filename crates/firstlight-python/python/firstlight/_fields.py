@@ -1,8 +1,9 @@
 """The methods of a scene that add things: their signatures and docstrings, from the tables of the scene format."""
 
 import json
-from inspect import Parameter, Signature, cleandoc
+from inspect import Parameter, Signature, cleandoc, signature
 
+from . import _models
 from ._firstlight import _nearest, _schema
 
 # The families whose things are called by a key, which is the first argument
@@ -33,11 +34,16 @@ def default(family, kind, field):
 def method(name, family, kind, table, handle):
     """A method of `Scene` that adds things of a kind."""
 
-    def named(self, name, **fields):
+    def added(self, name, fields):
+        if fields.get("file") is not None:
+            fields["file"] = _models.file_of(self, fields["file"])
         return handle(self, *self._add(family, kind, name, fields))
 
+    def named(self, name, **fields):
+        return added(self, name, fields)
+
     def unnamed(self, **fields):
-        return handle(self, *self._add(family, kind, "", fields))
+        return added(self, "", fields)
 
     add = named if family in _NAMED else unnamed
     add.__name__, add.__qualname__ = name, f"Scene.{name}"
@@ -55,6 +61,21 @@ def _signature(family, table):
     only, others = Parameter.KEYWORD_ONLY, [one for one in fields if not one[2]]
     needed = [Parameter(key, only) for key, _, needed in fields if needed]
     return Signature(first + needed + [Parameter(key, only, default=field.get("default")) for key, field, _ in others])
+
+
+def extended(function, name, table):
+    """A method of `Scene` that does what a function does, with the fields of a table in its signature and docstring."""
+
+    def add(self, *given, **fields):
+        return function(self, *given, **fields)
+
+    own = [one for one in signature(function).parameters.values() if one.kind != Parameter.VAR_KEYWORD]
+    names = {one.name for one in own}
+    more = [one for key, one in _signature("", table).parameters.items() if key not in names]
+    add.__name__, add.__qualname__ = name, f"Scene.{name}"
+    add.__signature__, add.__doc__ = Signature([*own, *more]), function.__doc__
+    add_to_doc(add, (table, names))
+    return add
 
 
 def _fields(table):

@@ -5,6 +5,7 @@ import os
 from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from hashlib import sha256
 from threading import Event
 
 import numpy as np
@@ -123,6 +124,124 @@ class Scene(SceneBase):
         scene._load_tree(tree, *_assets(assets))
         return scene
 
+    @classmethod
+    def from_model(
+        cls,
+        model,
+        *,
+        studio="soft",
+        ground=None,
+        view=None,
+        margin=None,
+        up=None,
+        smooth_deg=None,
+        variant=None,
+        scene=None,
+        animation=None,
+        name=None,
+        assets=None,
+        allow_dirs=(),
+        width=None,
+        height=None,
+        background=None,
+        transparent=None,
+        **settings,
+    ):
+        """Shows a model by itself, as `firstlight render chair.glb` does: in a studio, with a camera that sees it all.
+
+        Its renders have the bits of the program's with the same options. They are 1024 pixels square unless said, and
+        rendered with `aa_mode="multisample"`.
+
+        Parameters
+        ----------
+        model : path, bytes or open file, or a mesh or scene of trimesh or Open3D
+            A `.glb`, `.gltf`, `.obj`, `.ply` or `.stl` file. Files that it names are read from its folder and from
+            `allow_dirs`. Of meshes of other packages that is taken which `add` takes.
+        studio : {"soft", "hard", "flat", "clay", "none"}
+            What lights it: three area lights, two directional ones, nothing (materials show their colour), as "soft"
+            with everything a light warm gray, or the lights of the file alone.
+        ground : bool, optional
+            Whether it stands on a ground that takes its shadow; in "soft" and "clay" unless said.
+        view : str or (float, float), optional
+            Where the camera looks from: "front", "back", "left", "right", "top", "bottom", "iso" or "three-quarter",
+            which it is unless said; or azimuth and elevation in degrees.
+        margin : float, optional
+            What is left free on each side, as a part of the picture's shorter side, 0 to 0.45; 0.04 unless said.
+        up : {"y", "z"}, optional
+            The axis that points upwards in it: y unless said, and z of `.stl` files.
+        smooth_deg : float, optional
+            Normals are made smooth across edges of up to this angle; not of glTF files.
+        variant, scene, animation : str, int, str or int, optional
+            The variant, scene and animation of a glTF file. Without an animation it is at rest, and `render(time=...)`
+            plays the first one; `render(camera=NAME)` looks through a camera of the file.
+        name : str, optional
+            What bytes are called, in messages and where names are made of it; its ending says of which kind they are
+            where they do not say it themselves.
+        assets : path or dict of str and bytes, optional
+            The folder, or names and bytes, of the files that bytes name.
+        allow_dirs : list of path
+            Further folders whose files it may read.
+        width, height, background, transparent
+            The picture's; of width and height one alone is both.
+        **settings
+            Further settings of the picture, as `scene.settings` has them: antialiasing, tolerance, exposure, ...
+
+        Returns
+        -------
+        Scene
+        """
+        words = {"studio": studio, "ground": ground, "up": up, "smooth_deg": smooth_deg}
+        of_gltf = {"variant": variant, "scene": scene, "animation": animation}
+        made, content = cls(), _models.content_of(model)
+        if content is not None:
+            name, (folder, files) = name or content[1] or "model", _assets(assets)
+            files = {**(files or {}), name: content[0]}
+            made._load_model(None, name, {**words, **of_gltf}, folder, files, [], view, margin)
+        elif isinstance(model, (str, os.PathLike)):
+            folders = [os.fspath(folder) for folder in allow_dirs]
+            made._load_model(os.fspath(model), "", {**words, **of_gltf}, None, None, folders, view, margin)
+        else:
+            for word, value in of_gltf.items():
+                if value is not None:
+                    raise TypeError(f"{word} is for glTF files, and this is a {type(model).__name__}")
+            made._add_in_studio(model, words, view, margin, {} if name is None else {"name": name})
+        if (width is None) != (height is None):
+            width = height = height if width is None else width
+        given = {"width": width, "height": height, "background": background, "transparent": transparent, **settings}
+        made.settings.update(**{key: value for key, value in given.items() if value is not None})
+        return made
+
+    def use_studio(self, studio="soft", *, ground=None, view=None, margin=None):
+        """Lights the scene by a studio, beside its own lights: see `from_model`.
+
+        `ambient`, `background`, `display` and `tolerance` of `settings` become those of the studio. Its lights are
+        around all shapes, and are turned with the camera.
+
+        Parameters
+        ----------
+        studio : {"soft", "hard", "flat", "clay", "none"}
+        ground : bool, optional
+            Whether there is a ground below all shapes that takes their shadows; in "soft" and "clay" unless said.
+        view, margin : optional
+            Of the camera that is found for a scene without one, as `render` takes them.
+        """
+        self._use_studio({"studio": studio, "ground": ground}, view, margin)
+
+    def _add_in_studio(self, thing, words, view, margin, fields):
+        """Adds meshes of another package to a scene that is shown in a studio."""
+        studio, up, smooth_deg = words["studio"], words["up"], words["smooth_deg"]
+        shown = self._use_studio({"studio": studio, "ground": words["ground"]}, view, margin)
+        if up not in (None, "y", "z"):
+            raise ValueError(f"up is {up!r}; it is one of y, z")
+        if up == "z":
+            turned = [[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]]
+            own = fields.get("transform")
+            fields = {**fields, "transform": turned if own is None else np.asarray(own, dtype=np.float64) @ turned}
+        if smooth_deg is not None:
+            fields = {**fields, "smooth_deg": smooth_deg}
+        own = {"unlit": shown["unlit"], "_material": shown["material"]}
+        return self._add_thing(thing, {**fields, **{key: value for key, value in own.items() if value}})
+
     def __getitem__(self, name):
         return Handle(self, *self._find(name))
 
@@ -140,15 +259,15 @@ class Scene(SceneBase):
         """The picture, `[render]` of a scene: width, height, antialiasing, ambient, background, ..."""
         return Handle(self, "render", 0)
 
-    def add_mesh(self, vertices, faces, *, normals=None, uv=None, colors=None, static=False, **fields):
-        """Adds a triangle mesh from arrays, of which it keeps one copy.
+    def add_mesh(self, vertices, faces=None, *, normals=None, uv=None, colors=None, static=False, **fields):
+        """Adds a triangle mesh from arrays, of which it keeps one copy; or a mesh of trimesh or Open3D, as `add` does.
 
         Parameters
         ----------
-        vertices : array of shape (n, 3)
+        vertices : array of shape (n, 3), or a mesh of another package
             Places in metres; of any float or integer type, in any order in memory.
         faces : array of shape (m, 3)
-            The three vertices of each triangle, counted from 0, of any integer type.
+            The three vertices of each triangle, counted from 0, of any integer type; only of arrays.
         normals : array of shape (n, 3), optional
             A normal for each vertex.
         uv : array of shape (n, 2) or (sets, n, 2), optional
@@ -165,6 +284,9 @@ class Scene(SceneBase):
         -------
         Handle
         """
+        if faces is None:
+            given = {"normals": normals, "uv": uv, "colors": colors, "static": static or None}
+            return self.add(vertices, **{key: value for key, value in given.items() if value is not None}, **fields)
         if colors is not None:
             colors = np.asarray(colors)
             if colors.dtype.kind == "f" and colors.ndim == 2 and colors.size and (most := colors[:, :3].max()) > 1:
@@ -199,10 +321,10 @@ class Scene(SceneBase):
         return Handle(self, *self._add("camera", "camera", name, fields))
 
     def add(self, thing, **fields):
-        """Adds a mesh or a scene of trimesh, or a mesh of Open3D, with the fields that `add_mesh` takes.
+        """Adds a mesh or a scene of trimesh, or a mesh or a model of Open3D, with the fields that `add_mesh` takes.
 
-        Taken are triangles, texture coordinates, colours of vertices and of faces, and of materials the base colour and
-        its texture. What is not taken is told in one `SceneWarning` for each mesh, with its name.
+        Taken are triangles, texture coordinates, colours of vertices and of faces, and materials with their textures.
+        What is not taken is told in one `SceneWarning` for each mesh, with its name.
 
         `normals` and `smooth_deg` decide how smooth a mesh is. Where neither is given, a mesh of Open3D has its own
         normals, and is flat without. A mesh of trimesh is flat where all faces around each vertex lie in one plane, as
@@ -211,17 +333,26 @@ class Scene(SceneBase):
 
         Parameters
         ----------
-        thing : trimesh.Trimesh or trimesh.Scene or open3d.geometry.TriangleMesh or open3d.t.geometry.TriangleMesh
+        thing : trimesh.Trimesh or trimesh.Scene, or of Open3D a mesh, a mesh of tensors, or a model
+            A model is what `open3d.io.read_triangle_model` gives, or a dict of the same: `meshes`, each with `mesh`,
+            `mesh_name` and `material_idx`, and `materials`; or a dict of one `geometry` and its `material`.
         **fields
             What `add_mesh` takes. `name` and `transform` of a scene go before those of its nodes: `room/chair`.
 
         Returns
         -------
-        Handle, or a list of them for a scene
+        Handle, or a list of them for a scene or a model
         """
+        return self._add_thing(thing, fields)
+
+    def _add_thing(self, thing, fields):
+        """The same, with a dict of fields."""
         graph = getattr(thing, "graph", None)
         if graph is not None and hasattr(graph, "nodes_geometry"):
             return _models.add_graph(self, thing, fields)
+        parts = _models.parts_of(thing)
+        if parts is not None:
+            return _models.add_parts(self, parts, fields)
         model = _models.of(thing)
         if model is None:
             raise TypeError(f"a {type(thing).__name__} has neither vertices and faces nor vertices and triangles")
@@ -294,7 +425,7 @@ class Scene(SceneBase):
             if process == os.getpid():
                 pool.shutdown(wait=True, cancel_futures=True)
 
-    def cast(self, origins, directions, *, time=0.0):
+    def cast(self, origins, directions, *, time=None):
         """What each of many rays meets first, on all processors.
 
         Parameters
@@ -314,7 +445,7 @@ class Scene(SceneBase):
         flat = self._cast(origins.reshape(-1, 3), directions.reshape(-1, 3), time)
         return Hits(**{key: array.reshape(shape + array.shape[1:]) for key, array in flat.items()})
 
-    def visible(self, points, *, light, normals=None, time=0.0):
+    def visible(self, points, *, light, normals=None, time=None):
         """The share of a light that each point sees: 1 where it is lit, 0 in the umbra, between in the penumbra.
 
         Parameters
@@ -344,9 +475,9 @@ class Scene(SceneBase):
         return f"<firstlight.Scene {width} x {height}: {', '.join(counts) or 'empty'}>"
 
 
-def _restored(cls, text, files, meshes):
+def _restored(cls, text, files, meshes, shown):
     scene = cls()
-    scene._restore(text, files, meshes)
+    scene._restore(text, files, meshes, shown)
     return scene
 
 
@@ -366,6 +497,71 @@ def builtin(name):
     return scene
 
 
+def _add_model(
+    self,
+    file,
+    *,
+    studio=None,
+    ground=None,
+    view=None,
+    margin=None,
+    background=None,
+    transparent=None,
+    **fields,
+):
+    """Adds a model: all that a glTF, OBJ, PLY or STL file shows, or a mesh or scene of trimesh or Open3D.
+
+    A scene without a camera is given one that sees all of it; `view` and `margin` say how. Without a light it is
+    as dark as its `ambient` is; with `studio` a studio lights all of it, as `use_studio` does.
+
+    Parameters
+    ----------
+    file : path, bytes or open file, or a mesh or scene of trimesh or Open3D
+        In the scene's folder or below it; of a scene without a folder, from the working folder. Of meshes of other
+        packages that is taken which `add` takes.
+    studio : {"soft", "hard", "flat", "clay", "none"}, optional
+        What lights the scene, beside its own lights.
+    ground : bool, optional
+        Whether there is a ground that takes shadows, in a studio.
+    view, margin : optional
+        Of the camera that is found, as `render` takes them.
+    background, transparent : optional
+        Those of `settings`.
+    **fields
+        Those of the list below.
+
+    Returns
+    -------
+    Handle, or a list of them for a scene of trimesh and a model of Open3D
+    """
+    words = {} if studio is None else {"studio": studio, "ground": ground}
+    if studio is None and ground is not None:
+        raise ValueError("ground is for studios: name one, as studio='soft'")
+    shown = self._fields_in(words)
+    content = _models.content_of(file)
+    if content is not None:
+        path = self._give_file(content[0], sha256(content[0]).hexdigest(), f"/{content[1] or 'model'}")
+    elif isinstance(file, (str, os.PathLike)):
+        path = self._find_model(os.path.normpath(os.fspath(file)).replace(os.sep, "/"))
+    else:
+        path, own = None, {"unlit": shown["unlit"], "_material": shown["material"]}
+        of_mesh = {**{key: value for key, value in own.items() if value}, **fields}
+        if of_mesh.get("material") is not None:
+            of_mesh.pop("_material", None)
+        added = self._add_thing(file, of_mesh)
+    if path is not None:
+        fields = {**{key: value for key, value in shown.items() if value}, **fields}
+        added = Handle(self, *self._add("shape", "model", "", {"file": path, **fields}))
+    try:
+        self._use_studio(words, view, margin)
+        given = {"background": background, "transparent": transparent}
+        self.settings.update(**{key: value for key, value in given.items() if value is not None})
+    except BaseException:
+        _models.remove_all(self, added if isinstance(added, list) else [added])
+        raise
+    return added
+
+
 def _add_methods():
     """One method for each kind of thing that a scene may hold; what it takes are the fields of that kind's table."""
     families = [("shape", SHAPES, ""), ("light", LIGHTS, "_light")]
@@ -374,10 +570,11 @@ def _add_methods():
     for family, kinds, ending in families:
         for kind in kinds:
             name = f"add_{kind.replace('-', '_')}{ending}"
-            if name != "add_mesh":
+            if name not in ("add_mesh", "add_model"):
                 setattr(Scene, name, _fields.method(name, family, kind, tables[family, kind], Handle))
     own = set(tables["shape", "mesh"]["properties"]) - set(_OF_TRIANGLES)
     _fields.add_to_doc(Scene.add_mesh, (tables["shape", "instance"], {"of"}), (tables["shape", "mesh"], own))
+    setattr(Scene, "add_model", _fields.extended(_add_model, "add_model", tables["shape", "model"]))
     _fields.add_to_doc(Scene.add_camera, (tables["camera", "camera"], ()))
 
 

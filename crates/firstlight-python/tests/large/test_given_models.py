@@ -115,3 +115,59 @@ def test_what_is_lost_of_a_scene_is_told():
     assert whole.camera is not None
     with pytest.warns(fl.SceneWarning, match="its camera"):
         fl.Scene().add(whole)
+
+
+def materials():
+    """Materials of trimesh with all that they can have, or some of it."""
+    chance = np.random.default_rng(1)
+
+    def image(channels):
+        return Image.fromarray(chance.integers(0, 256, size=(8, 8, channels), dtype=np.uint8))
+
+    bent = np.full((8, 8, 3), (128, 128, 255), dtype=np.uint8)
+    bent[:4, :, 0] = 180
+    whole = {
+        "baseColorTexture": image(4),
+        "baseColorFactor": [200, 100, 255, 255],
+        "metallicFactor": 0.7,
+        "roughnessFactor": 0.8,
+        "metallicRoughnessTexture": image(3),
+        "normalTexture": Image.fromarray(bent),
+        "occlusionTexture": image(3),
+        "emissiveFactor": [0.2, 0.1, 0.0],
+        "emissiveTexture": image(3),
+        "doubleSided": False,
+    }
+    for other in (
+        {},
+        {"alphaMode": "MASK", "alphaCutoff": 0.4},
+        {"alphaMode": "BLEND"},
+        {"baseColorTexture": None, "metallicFactor": None},
+        {"emissiveFactor": None, "doubleSided": True},
+    ):
+        yield trimesh.visual.material.PBRMaterial(**{"name": "m", **whole, **other})
+
+
+@pytest.mark.parametrize("material", list(materials()), ids=["whole", "mask", "blend", "metal", "dark"])
+def test_materials_are_those_of_the_file_that_trimesh_writes(material):
+    # Each face by itself, so that normals are those of the faces in both
+    box = trimesh.creation.box()
+    vertices, faces = box.vertices[box.faces.ravel()], np.arange(36).reshape(-1, 3)
+    uv = np.random.default_rng(2).random((36, 2))
+    visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
+    mesh, scene = trimesh.Trimesh(vertices, faces, process=False, visual=visual), trimesh.Scene()
+    scene.add_geometry(mesh, node_name="a")
+    turned = trimesh.transformations.rotation_matrix(0.5, [1, 2, 3])
+    turned[0, 3] = 1.5
+    scene.add_geometry(mesh, node_name="b", transform=turned)
+    file = fl.Scene.from_model(bytes(scene.export(file_type="glb")), width=64)
+    own = fl.Scene.from_model(scene, width=64)
+    with warnings.catch_warnings():
+        # That what emits light lights nothing
+        warnings.simplefilter("ignore", fl.SceneWarning)
+        for buffer in ("albedo", "metallic", "roughness", "emission", "normal", "opacity"):
+            one, other = (each.render(buffers=buffer)[buffer] for each in (file, own))
+            # But at edges: the file has its numbers in 32 bits
+            assert (np.abs(one - other) > 1e-3).mean() < 0.002, buffer
+        pictures = [each.render().rgb8().astype(int) for each in (file, own)]
+    assert (np.abs(pictures[0] - pictures[1]) > 2).mean() < 0.002

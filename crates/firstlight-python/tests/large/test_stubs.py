@@ -14,7 +14,7 @@ pytest.importorskip("mypy")
 
 # What the stubs have alone: words for types, and what Python's own Mapping says better
 ALLOWED = [
-    r"firstlight\.(Buffer|Color|ColorParam|NumberParam|Transform|Vector)",
+    r"firstlight\.(Buffer|Color|ColorParam|Content|NumberParam|Studio|Transform|Vector|View)",
     r"firstlight\.Handle\.__init__",
     r"firstlight\.Render\.get",
 ]
