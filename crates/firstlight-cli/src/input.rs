@@ -93,14 +93,14 @@ impl Assets for Remembered {
 pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
     let work = |why: String| Failure::Work(format!("{}: {why}", shown(scene)));
     if is_model(scene) {
-        return read_model(scene, reading);
+        return refuse_no_lights(read_model(scene, reading)?, &reading.model);
     }
     // A file may be given as standard input
     let stdin = || cfg!(unix).then(|| PathBuf::from("/dev/stdin"));
     let input = if scene == "-" {
         let bytes = read_stream(io::stdin().lock()).map_err(|why| Failure::Work(format!("standard input: {why}")))?;
         if is_mesh(&bytes) {
-            return Ok(piped_model("<stdin>", stdin(), bytes, reading));
+            return refuse_no_lights(piped_model("<stdin>", stdin(), bytes, reading), &reading.model);
         }
         // A name tells JSON from TOML; no TOML begins with a brace. A byte order mark is no part of the text
         let marked = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
@@ -116,7 +116,7 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
             let head = read_head(&file).map_err(work)?;
             // Whatever its name: a model is known by its content
             if is_mesh(&head) || is_binary_stl(&head, meta.len()) {
-                return read_model(scene, reading);
+                return refuse_no_lights(read_model(scene, reading)?, &reading.model);
             }
             read_rest(head, file, TEXT_LIMIT)
         } else {
@@ -124,7 +124,8 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
         };
         let bytes = bytes.map_err(work)?;
         if is_mesh(&bytes) {
-            return Ok(piped_model(&scene.display().to_string(), Some(scene.to_path_buf()), bytes, reading));
+            let model = piped_model(&scene.display().to_string(), Some(scene.to_path_buf()), bytes, reading);
+            return refuse_no_lights(model, &reading.model);
         }
         let folder = scene.parent().map(Path::to_path_buf).unwrap_or_default();
         read_text(scene.display().to_string(), &bytes, Some(&folder), Some(scene.to_path_buf()), reading)?
@@ -264,6 +265,22 @@ fn binary_stl_length(head: &[u8]) -> Option<u64> {
 /// Whether a file of that length, which begins so, is a binary STL file.
 fn is_binary_stl(head: &[u8], length: u64) -> bool {
     binary_stl_length(head) == Some(length)
+}
+
+/// Sees that a model that is to be shown by the lights of its file may have some.
+///
+/// # Errors
+/// Files of its kind have none.
+fn refuse_no_lights(input: Input, model: &ModelArgs) -> Result<Input, Failure> {
+    if input.studio.as_ref().is_none_or(|studio| studio.studio != Studio::None) || input.is_gltf() {
+        return Ok(input);
+    }
+    let option = if model.lights.is_some() { "--lights file" } else { "--studio none" };
+    let name = &input.name;
+    Err(Failure::Usage(format!(
+        "{option} shows a model by the lights of its file, and {name} has none: only glTF files do; leave the option \
+         out, or choose --studio soft, hard, flat or clay"
+    )))
 }
 
 /// A scene around a model.

@@ -253,6 +253,20 @@ fn a_model_is_spoken_of_by_its_name() {
 }
 
 #[test]
+fn lights_of_a_file_that_can_have_none_are_no_option() {
+    let folder = Folder::new();
+    folder.put("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    for option in ["--studio none", "--lights file"] {
+        for command in ["check", "info", "render"] {
+            let words = "shows a model by the lights of its file, and a.obj has none: only glTF files do; leave";
+            folder.run(&format!("{command} a.obj {option}")).exits(2).says(&[&format!("error: {option} {words}")]);
+        }
+    }
+    folder.put("a.gltf", GLTF);
+    folder.run("check a.gltf --studio none").done();
+}
+
+#[test]
 fn an_empty_file_is_said_to_be_empty() {
     let folder = Folder::new();
     for name in ["a.obj", "a.ply", "a.stl"] {
