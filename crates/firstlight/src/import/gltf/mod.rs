@@ -116,10 +116,10 @@ impl Gltf {
         JsonPlace::root(&self.json)
     }
 
-    /// The names of its materials.
+    /// What its materials are called.
     pub fn material_names(&self) -> Vec<String> {
         let materials = self.root().list("materials").unwrap_or_default();
-        materials.iter().filter_map(|material| material.text_of("name")).map(str::to_owned).collect()
+        materials.iter().enumerate().map(|(index, material)| called(material, index)).collect()
     }
 
     /// As [`nodes`](Self::nodes), computed once for a pose.
@@ -174,6 +174,12 @@ impl Gltf {
             None => Err(image.fault("has neither \"uri\" nor \"bufferView\"")),
         }
     }
+}
+
+/// What material number `index` is called: by its name, and without one `material 3`.
+pub(crate) fn called(material: &JsonPlace<'_>, index: usize) -> String {
+    let name = material.text_of("name").filter(|name| !name.is_empty());
+    name.map_or_else(|| format!("material {index}"), str::to_owned)
 }
 
 /// The names of the animations of a glTF file, in its order; empty where an animation has none. Of what is no glTF file

@@ -8,7 +8,7 @@ use super::super::{ModelParts, ModelWarning, clay, material_name, shown, unique}
 use super::{ShownModel, no_such};
 use crate::describe::{Channel, ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc};
 use crate::image::read::{Limits, read_header};
-use crate::import::{Gltf, GltfFault, JsonPlace, Uri};
+use crate::import::{Gltf, GltfFault, JsonPlace, Uri, called};
 use crate::material::{AlphaMode, MaterialCommonDesc, MaterialDesc, MetallicRoughnessDesc, UnlitDesc};
 use crate::texture::{Filter, ImageTextureDesc, TextureDesc, Wrap};
 
@@ -84,19 +84,15 @@ impl<'a> Materials<'a> {
             return Ok(name.clone());
         }
         let at = number.map(|number| self.gltf.root().of_index("materials", &number)).transpose()?;
-        let own = match &at {
-            Some(at) => at.text_of("name").unwrap_or_default(),
-            None => "",
+        let own = match (&at, index) {
+            (Some(at), Some(index)) => called(at, index),
+            _ if has_colors => "default with colours".to_owned(),
+            _ => "default".to_owned(),
         };
-        let name = match (self.shown.chosen)(own) {
+        let chosen = index.and_then(|_| (self.shown.chosen)(&own));
+        let name = match chosen {
             Some(chosen) => chosen,
             None => {
-                let own = match (own, index) {
-                    ("", Some(index)) => format!("material {index}"),
-                    ("", None) if has_colors => "default with colours".to_owned(),
-                    ("", None) => "default".to_owned(),
-                    (own, _) => own.to_owned(),
-                };
                 let name = unique(material_name(self.shown.file, &own, self.shown.unlit), |name| {
                     self.materials.iter().any(|(other, _)| other == name)
                 });
