@@ -10,7 +10,7 @@ use crate::context::{Assets, CompileContext};
 use crate::describe::Family;
 use crate::describe::node::quoted;
 use crate::error::{SceneError, Severity};
-use crate::import::{MeshFormat, OpenFault, is_gltf, is_point_set};
+use crate::import::{MeshFormat, OpenFault, WantedFile, foreign, is_gltf, is_point_set};
 use crate::material::MaterialDesc;
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::model::{ModelParts, ShownMesh, ShownModel, describe_gltf, describe_mesh, describe_points, unique};
@@ -301,9 +301,16 @@ impl ModelDesc {
             Some(ModelKind::Gltf)
         } else if is_point_set(&bytes[..bytes.len().min(HEAD)]) {
             Some(ModelKind::Points)
+        } else if let Some(foreign) = foreign(&bytes, WantedFile::Model) {
+            let message = format!("{}: {}", quoted(file), foreign.message(WantedFile::Model));
+            cx.error("file", message, Some(foreign.hint(WantedFile::Model)));
+            None
+        } else if let Some(format) = MeshFormat::detect(file, &bytes) {
+            Some(ModelKind::Mesh(format))
         } else {
-            // What is none of them is refused where it is read
-            Some(ModelKind::Mesh(MeshFormat::detect(file, &bytes).unwrap_or(MeshFormat::Ply)))
+            let message = format!("{}: is not a model of a known kind", quoted(file));
+            cx.error("file", message, Some("give a glTF, GLB, OBJ, PLY or STL file"));
+            None
         }
     }
 
