@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use firstlight::{
-    AssetError, Assets, CompileCache, CompileOptions, Compiled, FolderAssets, Framing, MeshFormat, NoAssets, Parsed,
-    SceneDesc, Studio, StudioSettings, UpAxis, builtin_scenes, gltf_animations, is_gltf,
+    AssetError, Assets, CompileCache, CompileOptions, Compiled, Diagnostic, FolderAssets, Framing, MeshFormat,
+    ModelPicture, ModelReport, NoAssets, Parsed, SceneDesc, Severity, Studio, StudioSettings, UpAxis, builtin_scenes,
+    gltf_animations, is_gltf,
 };
 
 use crate::args::{Axis, LightSource, ModelArgs, ReadingArgs, StudioName, Switch};
@@ -427,6 +428,29 @@ impl Input {
         let ending = |name: &str| name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase());
         let called = self.assets.model.as_ref().and_then(|(called, _)| ending(called));
         matches!(called.as_deref(), Some("glb" | "gltf")) || self.model_bytes().is_ok_and(|bytes| is_gltf(&bytes))
+    }
+
+    /// What a model by itself holds, at `time` in seconds.
+    ///
+    /// # Errors
+    /// It cannot be shown, or is none.
+    pub fn model_report(&self, time: f64) -> Result<ModelReport, Failure> {
+        match self.parsed.model_report(&self.assets, time) {
+            Some(report) => report.map_err(|e| Failure::Scene(e.faults)),
+            None => Err(Failure::Work(format!("{}: is no model", self.name))),
+        }
+    }
+
+    /// That pictures of a model are missing or damaged, a warning each.
+    pub fn faults_of_pictures(&self, report: &ModelReport) -> Vec<Diagnostic> {
+        let warning = |picture: &ModelPicture| Diagnostic {
+            severity: Severity::Warning,
+            place: None,
+            path: String::new(),
+            message: format!("{}: {:?}: {}", self.name, picture.file, picture.fault.as_deref().unwrap_or_default()),
+            hint: Some("magenta and black squares stand in for it".into()),
+        };
+        report.faulty_pictures().map(warning).collect()
     }
 
     /// The bytes of the model's own file.

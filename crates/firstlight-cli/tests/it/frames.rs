@@ -118,7 +118,7 @@ fn models_play_what_they_have() {
         folder.run(&format!("render {what} {quick} -o a.png")).done().says(&["wrote a.png"]);
         Picture::decode(&folder.get("a.png"))
     };
-    // All of the way to the right at 1 s; the camera of one moment goes with it
+    // Half of the way to the right at 1 s; the camera of one moment goes with it
     let rest = render("chair.gltf");
     assert!(rest == render("chair.gltf --time 0"));
     assert!(rest == render("chair.gltf --time 1"));

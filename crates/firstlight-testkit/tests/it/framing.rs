@@ -112,8 +112,9 @@ fn every_model_is_in_the_middle_of_its_picture() {
 #[test]
 fn upwards_is_what_is_said() {
     let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/gallery/meshes/spot.obj");
-    let of =
-        |up| seen(&compiled(&model, Framing { view: View::new(0.0, 0.0), margin: 0.0, ..Framing::default() }, up)).unwrap();
+    let of = |up| {
+        seen(&compiled(&model, Framing { view: View::new(0.0, 0.0), margin: 0.0, ..Framing::default() }, up)).unwrap()
+    };
     // The calf from the front, and from above with its head on the near side: another outline
     let ([x, y], [other_x, other_y]) = (of(UpAxis::Y), of(UpAxis::Z));
     assert_eq!((y[0], y[1]), (0, SIZE[1]));

@@ -72,6 +72,7 @@ fn add_mtl(parts: &mut ModelParts, data: &MeshData, shown_mesh: &ShownMesh<'_>, 
     let ShownMesh { file, unlit, chosen, assets, .. } = *shown_mesh;
     let folder = file.rsplit_once('/').map_or("", |(folder, _)| folder);
     let mut described = HashSet::new();
+    let named: HashSet<&str> = data.materials.iter().map(String::as_str).collect();
     // A name may hold blanks; where there is no file of such a name, the line has several
     let names = data.material_files.iter().flat_map(|line| match read_beside(line, folder, assets) {
         Some(_) => vec![line.as_str()],
@@ -81,6 +82,7 @@ fn add_mtl(parts: &mut ModelParts, data: &MeshData, shown_mesh: &ShownMesh<'_>, 
         let Some((path, bytes)) = read_beside(written, folder, assets) else {
             let message = format!("{written:?}: there is no such file of materials");
             let hint = "its faces are of a light gray; an OBJ file needs its MTL files beside it";
+            parts.spare.files.push((join_path(folder, &written.replace('\\', "/")), None));
             parts.warnings.push(ModelWarning { message, hint: hint.to_owned() });
             continue;
         };
@@ -89,17 +91,17 @@ fn add_mtl(parts: &mut ModelParts, data: &MeshData, shown_mesh: &ShownMesh<'_>, 
             Err(error) => {
                 let hint = "its faces are of a light gray".to_owned();
                 parts.warnings.push(ModelWarning { message: format!("{path:?}: {error}"), hint });
+                parts.spare.files.push((path, None));
                 continue;
             }
         };
+        parts.spare.files.push((path.clone(), Some(bytes.len() as u64)));
         let inside = path.rsplit_once('/').map_or("", |(folder, _)| folder).to_owned();
         let has_alpha = |picture: &str| {
             let bytes = assets.read(&join_path(&inside, picture), MAX_PICTURE).ok()?;
             Some(read_header(&bytes, &Limits::default()).ok()?.has_alpha())
         };
-        let is_wanted = |name: &str| {
-            data.materials.iter().any(|own| own == name) && !described.contains(name) && chosen(name).is_none()
-        };
+        let is_wanted = |name: &str| named.contains(name) && !described.contains(name) && chosen(name).is_none();
         let settings = MtlSettings {
             is_wanted: &is_wanted,
             texture_name: &|name| format!("{path}/{name}"),
@@ -118,6 +120,8 @@ fn add_mtl(parts: &mut ModelParts, data: &MeshData, shown_mesh: &ShownMesh<'_>, 
             let hint = note.hint.unwrap_or_default();
             parts.notes.push(ModelWarning { message: format!("{path}:{}: {}", note.line, note.message), hint });
         }
+        parts.spare.materials.extend(read.unwanted.into_iter().filter(|name| !named.contains(name.as_str())));
+        parts.spare.pictures.extend(read.unused_pictures.iter().map(|picture| join_path(&inside, picture)));
         for (name, mut texture) in read.textures {
             if let TextureDesc::Image(image) = &mut texture {
                 image.file.0 = join_path(&inside, &image.file.0);
@@ -205,6 +209,16 @@ mod tests {
         assert!(matches!(parts.materials[0].1, MaterialDesc::Phong(_)));
         assert_eq!(parts.materials[1].1, clay(false));
         assert_eq!(parts.warnings[0].message, "1 of its materials are described in no MTL file, \"other\" for one");
+    }
+
+    #[test]
+    fn what_no_face_has_is_told() {
+        let text = "newmtl red\nKd 1 0 0\nmap_Kd wood.png\nillum 1\nmap_Ks shine.png\nnewmtl blue\nmap_Kd sky.png\n";
+        let parts = described(&["red"], "sub/a.mtl none.mtl", &[("m/sub/a.mtl", text)]);
+        let files = [("m/sub/a.mtl".to_owned(), Some(text.len() as u64)), ("m/none.mtl".to_owned(), None)];
+        assert_eq!(parts.spare.files, files);
+        assert_eq!(parts.spare.materials, ["blue"]);
+        assert_eq!(parts.spare.pictures, ["m/sub/shine.png", "m/sub/sky.png"]);
     }
 
     #[test]

@@ -18,10 +18,20 @@ use crate::shape::{GroupDesc, MeshFiles, ModelDesc, ShapeDesc, UpAxis, load_mesh
 use crate::transform::TransformDesc;
 
 /// What kind of model a file is.
-enum ModelKind {
+pub(super) enum ModelKind {
     Gltf,
     Mesh(MeshFormat),
     Points,
+}
+
+impl ModelKind {
+    /// The axis that points upwards, unless it is said.
+    pub(super) fn up(&self) -> UpAxis {
+        match self {
+            ModelKind::Mesh(MeshFormat::Stl) => UpAxis::Z,
+            _ => UpAxis::Y,
+        }
+    }
 }
 
 impl SceneDesc {
@@ -195,7 +205,7 @@ fn transform_of(affine: &DAffine3) -> Option<Box<TransformDesc>> {
 
 impl ModelDesc {
     /// What the file describes, and the way from its axes to those of scenes. `None` after an error.
-    fn parts(
+    pub(super) fn parts(
         &self,
         cx: &mut CompileContext,
         assets: &dyn Assets,
@@ -204,10 +214,7 @@ impl ModelDesc {
         let (kind, file) = (self.kind(cx, assets, files)?, self.file.0.as_str());
         self.refuse_fields(cx, matches!(kind, ModelKind::Gltf));
         let chosen = |name: &str| self.materials.get(name).map(str::to_owned);
-        let up = match kind {
-            ModelKind::Mesh(MeshFormat::Stl) => UpAxis::Z,
-            _ => UpAxis::Y,
-        };
+        let up = kind.up();
         let (parts, names) = match kind {
             ModelKind::Points => (describe_points(file, self.unlit), Vec::new()),
             ModelKind::Mesh(_) => {
@@ -258,15 +265,25 @@ impl ModelDesc {
                 cx.unknown("materials", "material of the file", name, &names);
             }
         }
+        self.tell(cx, &parts);
+        Some((parts, self.upright(up)))
+    }
+
+    /// Says what the reader had to say.
+    pub(super) fn tell(&self, cx: &mut CompileContext, parts: &ModelParts) {
+        let file = quoted(&self.file.0);
         for warning in &parts.warnings {
-            cx.warning("file", format!("{}: {}", quoted(file), warning.message), Some(&warning.hint));
+            cx.warning("file", format!("{file}: {}", warning.message), Some(&warning.hint));
         }
         for note in &parts.notes {
-            cx.advise("file", format!("{}: {}", quoted(file), note.message), Some(&note.hint));
+            cx.advise("file", format!("{file}: {}", note.message), Some(&note.hint));
         }
+    }
+
+    /// The way from the axes of the file, of which `up` is upwards unless it is said, to those of scenes.
+    pub(super) fn upright(&self, up: UpAxis) -> DAffine3 {
         let turned = DAffine3 { matrix3: DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y), translation: DVec3::ZERO };
-        let up = if self.up.unwrap_or(up) == UpAxis::Z { turned } else { DAffine3::IDENTITY };
-        Some((parts, up))
+        if self.up.unwrap_or(up) == UpAxis::Z { turned } else { DAffine3::IDENTITY }
     }
 
     /// Refuses materials that the scene does not describe, and goes on without them.
@@ -287,7 +304,12 @@ impl ModelDesc {
     }
 
     /// What kind of file it is: by its ending, else by its content. `None` after an error.
-    fn kind(&self, cx: &mut CompileContext, assets: &dyn Assets, files: &mut MeshFiles<'_>) -> Option<ModelKind> {
+    pub(super) fn kind(
+        &self,
+        cx: &mut CompileContext,
+        assets: &dyn Assets,
+        files: &mut MeshFiles<'_>,
+    ) -> Option<ModelKind> {
         let file = &self.file.0;
         let ending = file.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase());
         match ending.as_deref() {
@@ -315,7 +337,7 @@ impl ModelDesc {
     }
 
     /// Refuses fields that files of the other kinds have no use for.
-    fn refuse_fields(&self, cx: &mut CompileContext, is_gltf: bool) {
+    pub(super) fn refuse_fields(&self, cx: &mut CompileContext, is_gltf: bool) {
         if let Some(time) = self.time {
             cx.between("time", time, -1e9, 1e9, Some("in seconds"));
         }

@@ -73,6 +73,10 @@ pub(crate) struct Gltf {
     folder: String,
     /// BLAKE3 of the file and of all its buffers.
     pub hash: [u8; 32],
+    /// Whether it is a binary container.
+    pub is_binary: bool,
+    /// Bytes of the file itself.
+    pub length: u64,
     /// Bytes that may still be taken.
     budget: AtomicU64,
     /// The nodes of the last pose: each of many meshes with a skin asks for them.
@@ -108,12 +112,34 @@ impl Gltf {
             buffers.push(buffer.map(Arc::new));
         }
         let budget = AtomicU64::new(BUDGET.saturating_add(length.saturating_mul(BUDGET_TIMES)));
-        Ok(Gltf { json, buffers, folder, hash: *hasher.finalize().as_bytes(), budget, posed: Mutex::default() })
+        Ok(Gltf {
+            json,
+            buffers,
+            folder,
+            hash: *hasher.finalize().as_bytes(),
+            is_binary: bytes.starts_with(b"glTF"),
+            length: bytes.len() as u64,
+            budget,
+            posed: Mutex::default(),
+        })
     }
 
     /// Its JSON.
     pub fn root(&self) -> JsonPlace<'_> {
         JsonPlace::root(&self.json)
+    }
+
+    /// The files of its buffers, each with its length; `None` where it could not be read.
+    pub fn buffer_files(&self) -> Vec<(String, Option<u64>)> {
+        let places = self.root().list("buffers").unwrap_or_default();
+        let file = |(at, buffer): (&JsonPlace<'_>, &Result<Arc<Vec<u8>>, GltfFault>)| match Uri::of(
+            at.text_of("uri")?,
+            &self.folder,
+        ) {
+            Uri::File(path) => Some((path, buffer.as_ref().ok().map(|bytes| bytes.len() as u64))),
+            Uri::Data(_) | Uri::Scheme(_) => None,
+        };
+        places.iter().zip(&self.buffers).filter_map(file).collect()
     }
 
     /// What its materials are called.

@@ -33,7 +33,7 @@ struct Used {
     may_have_alpha: bool,
 }
 
-const VARIANTS: &str = "KHR_materials_variants";
+pub(super) const VARIANTS: &str = "KHR_materials_variants";
 /// How much of the light behind thin glass is seen at most.
 const CLEAREST: f64 = 0.85;
 

@@ -416,7 +416,7 @@ fn materials_are_called_as_the_file_calls_them() {
     // Without a material: matte, and white below the colours of vertices
     assert_eq!(parts.materials[3].1, clay(false));
     assert_eq!(parts.materials[4].1, clay(true));
-    let unlit = describe(&open(file, &[]), &ShownModel { unlit: true, ..PLAIN }).expect("is read");
+    let unlit = describe(&open(file.clone(), &[]), &ShownModel { unlit: true, ..PLAIN }).expect("is read");
     assert!(unlit.materials.iter().all(|(_, material)| matches!(material, MaterialDesc::Unlit(_))));
     assert_eq!(unlit.materials[0].0, "m/a.gltf/default unlit");
     // So they are replaced by those of the scene, and what has none is no material of that name
