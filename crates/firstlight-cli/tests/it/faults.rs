@@ -144,7 +144,7 @@ fn a_file_of_another_kind_is_one_line_that_says_what_it_is() {
         // The same under a model's name, and as the file of a mesh in a scene
         let what = said.split(", ").next().unwrap();
         folder.put("a.ply", bytes);
-        let ran = folder.run("render a.ply -o out.png").exits(1).says(&["error: a.ply: ", what, "not like a mesh"]);
+        let ran = folder.run("render a.ply -o out.png").exits(1).says(&["error: a.ply: ", what, "not like a model"]);
         assert_eq!(ran.stderr.lines().count(), 2, "{}", ran.stderr);
         assert!(!ran.stderr.contains("mesh[0]"), "{}", ran.stderr);
         folder.put("scene.toml", format!("{SCENE}[[mesh]]\nfile = \"a.ply\"\n"));
