@@ -491,6 +491,9 @@ pub struct RenderArgs {
 pub struct CheckArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
+    /// As JSON, for another program to read: whether it is ok, and all errors, warnings and notes
+    #[arg(long)]
+    pub json: bool,
 }
 
 const INFO_EXAMPLES: &str = "\
@@ -498,7 +501,8 @@ Examples:
   firstlight info room.toml
       its camera, shapes, lights, materials, textures
   firstlight info bunny.ply
-      its triangles, and whether its surface is closed
+      its triangles, whether its surface is closed, and what else is odd; of glTF files also
+      materials, pictures, extensions, animations, variants and cameras
   firstlight info room.exr --json
       the receipt of a picture (.png, .exr, .npz, .npy, .hdr): what made it, and its buffers";
 

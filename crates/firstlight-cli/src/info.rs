@@ -1,18 +1,17 @@
 //! `firstlight info`: what a scene, a model or a picture holds.
 
+mod model;
 mod picture;
 
 use std::fmt::Write;
-use std::ops::ControlFlow;
 
 use firstlight::{
     CameraDesc, Compiled, DVec3, DisplayEncoding, Frame, Projection, SamplesDesc, Scene, SceneDesc, printable,
-    read_mesh,
 };
 use serde_json::{Map, Value, json};
 
 use crate::args::{InfoArgs, ReadingArgs};
-use crate::input::{self, Input};
+use crate::input;
 use crate::report::{Failure, answer, show_diagnostics, shown};
 
 /// Says what a scene, a model or a picture holds.
@@ -25,9 +24,9 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
         refuse_options_of_scenes(args)?;
         return picture::answer_picture(file, args.json);
     }
-    let input = input::read(&args.scene.scene, &args.scene.reading)?;
-    if input.studio.is_some() && !input.is_gltf() {
-        return answer_model(&input, args);
+    let mut input = input::read(&args.scene.scene, &args.scene.reading)?;
+    if input.studio.is_some() {
+        return model::answer_model(&mut input, args);
     }
     let compiled = input.compile(args.time.unwrap_or(0.0), false)?;
     show_diagnostics(&compiled.warnings);
@@ -58,87 +57,6 @@ fn refuse_options_of_scenes(args: &InfoArgs) -> Result<(), Failure> {
         }
         None => Ok(()),
     }
-}
-
-/// Says what a model holds.
-fn answer_model(input: &Input, args: &InfoArgs) -> Result<(), Failure> {
-    if args.time.is_some() {
-        return Err(Failure::Usage(format!("--time has no meaning for a model, and {} is one", input.name)));
-    }
-    let bytes = input.model_bytes()?;
-    let mesh = read_mesh(&input.name, &bytes, &|_, _| ControlFlow::Continue(()))
-        .map_err(|error| Failure::Work(error.to_string()))?;
-    let report = mesh.report();
-    let parts = list_of(
-        &mesh.parts,
-        |part| json!({ "object": part.object, "group": part.group, "triangles": part.triangles.len() }),
-    );
-    let info = json!({
-        "model": input.name,
-        "file_bytes": bytes.len(),
-        "vertices": report.vertices,
-        "positions": report.positions,
-        "triangles": report.triangles,
-        "bounds": report.bounds.map(bounds),
-        "closed": report.is_closed(),
-        "boundary_edges": report.boundary_edges,
-        "non_manifold_edges": report.non_manifold_edges,
-        "turned_edges": report.turned_edges,
-        "degenerate_triangles": report.degenerate_triangles,
-        "duplicate_triangles": report.duplicate_triangles,
-        "non_finite_triangles": report.non_finite_triangles,
-        "non_finite_vertices": report.non_finite_vertices,
-        "unused_vertices": report.unused_vertices,
-        "normals": report.has_normals,
-        "bad_normals": report.bad_normals,
-        "uv_sets": report.uv_sets,
-        "colors": report.has_colors,
-        "radii": !mesh.radii.is_empty(),
-        "parts": parts,
-        "materials": mesh.materials,
-        "material_files": mesh.material_files,
-        "notes": mesh.notes,
-        "memory_bytes": report.bytes,
-    });
-    answer(&if args.json { format!("{info:#}\n") } else { model_text(&info) })
-}
-
-/// The same for people.
-fn model_text(info: &Value) -> String {
-    let mut text = String::new();
-    let mut line = |name: &str, value: String| {
-        // A String takes every write
-        let _ = writeln!(text, "{name:<10} {value}");
-    };
-    let yes = |value: &Value, yes: &str, no: &str| (if *value == true { yes } else { no }).to_owned();
-    line("model", word(&info["model"]));
-    line("file", format!("{} bytes", info["file_bytes"]));
-    line("vertices", format!("{}, at {} positions", info["vertices"], info["positions"]));
-    line("triangles", info["triangles"].to_string());
-    match &info["bounds"] {
-        Value::Null => line("bounds", "none: there are no finite vertices".into()),
-        bounds => line("bounds", pairs(bounds)),
-    }
-    let open = ["boundary_edges", "non_manifold_edges", "turned_edges"].map(|key| info[key].to_string());
-    let edges = format!("{} on a boundary, {} of more than two faces, {} turned", open[0], open[1], open[2]);
-    line("surface", yes(&info["closed"], "closed", "not closed"));
-    line("edges", edges);
-    let faces =
-        ["degenerate_triangles", "duplicate_triangles", "non_finite_triangles"].map(|key| info[key].to_string());
-    line("faces", format!("{} without area, {} twice, {} not finite", faces[0], faces[1], faces[2]));
-    line("", format!("{} vertices not finite, {} unused", info["non_finite_vertices"], info["unused_vertices"]));
-    let bad = info["bad_normals"].as_u64().filter(|bad| *bad > 0).map(|bad| format!(", {bad} of no direction"));
-    line("normals", yes(&info["normals"], "given", "none: flat, unless smoothed") + &bad.unwrap_or_default());
-    line("uv", format!("{} sets", info["uv_sets"]));
-    line("colors", yes(&info["colors"], "given", "none"));
-    line("ids", "1 surface; a triangle's number is that of the file".into());
-    for group in ["parts", "materials", "material_files", "notes"] {
-        for thing in info[group].as_array().into_iter().flatten() {
-            line(group, word(thing));
-        }
-    }
-    line("in memory", format!("{} bytes, without the tree", info["memory_bytes"]));
-    text
 }
 
 /// Everything there is to say, as JSON; the text is made from it.

@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use firstlight::{
-    AssetError, Assets, CompileCache, CompileOptions, Compiled, FolderAssets, Framing, MeshFormat, NoAssets, Parsed,
-    SceneDesc, Studio, StudioSettings, UpAxis, builtin_scenes, gltf_animations, is_gltf,
+    AssetError, Assets, CompileCache, CompileOptions, Compiled, Diagnostic, FolderAssets, Framing, MeshFormat,
+    ModelPicture, ModelReport, NoAssets, Parsed, SceneDesc, Severity, Studio, StudioSettings, UpAxis, builtin_scenes,
+    gltf_animations, is_gltf,
 };
 
 use crate::args::{Axis, LightSource, ModelArgs, ReadingArgs, StudioName, Switch};
@@ -93,14 +94,14 @@ impl Assets for Remembered {
 pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
     let work = |why: String| Failure::Work(format!("{}: {why}", shown(scene)));
     if is_model(scene) {
-        return read_model(scene, reading);
+        return refuse_no_lights(read_model(scene, reading)?, &reading.model);
     }
     // A file may be given as standard input
     let stdin = || cfg!(unix).then(|| PathBuf::from("/dev/stdin"));
     let input = if scene == "-" {
         let bytes = read_stream(io::stdin().lock()).map_err(|why| Failure::Work(format!("standard input: {why}")))?;
         if is_mesh(&bytes) {
-            return Ok(piped_model("<stdin>", stdin(), bytes, reading));
+            return refuse_no_lights(piped_model("<stdin>", stdin(), bytes, reading), &reading.model);
         }
         // A name tells JSON from TOML; no TOML begins with a brace. A byte order mark is no part of the text
         let marked = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
@@ -116,7 +117,7 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
             let head = read_head(&file).map_err(work)?;
             // Whatever its name: a model is known by its content
             if is_mesh(&head) || is_binary_stl(&head, meta.len()) {
-                return read_model(scene, reading);
+                return refuse_no_lights(read_model(scene, reading)?, &reading.model);
             }
             read_rest(head, file, TEXT_LIMIT)
         } else {
@@ -124,7 +125,8 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
         };
         let bytes = bytes.map_err(work)?;
         if is_mesh(&bytes) {
-            return Ok(piped_model(&scene.display().to_string(), Some(scene.to_path_buf()), bytes, reading));
+            let model = piped_model(&scene.display().to_string(), Some(scene.to_path_buf()), bytes, reading);
+            return refuse_no_lights(model, &reading.model);
         }
         let folder = scene.parent().map(Path::to_path_buf).unwrap_or_default();
         read_text(scene.display().to_string(), &bytes, Some(&folder), Some(scene.to_path_buf()), reading)?
@@ -264,6 +266,22 @@ fn binary_stl_length(head: &[u8]) -> Option<u64> {
 /// Whether a file of that length, which begins so, is a binary STL file.
 fn is_binary_stl(head: &[u8], length: u64) -> bool {
     binary_stl_length(head) == Some(length)
+}
+
+/// Sees that a model that is to be shown by the lights of its file may have some.
+///
+/// # Errors
+/// Files of its kind have none.
+fn refuse_no_lights(input: Input, model: &ModelArgs) -> Result<Input, Failure> {
+    if input.studio.as_ref().is_none_or(|studio| studio.studio != Studio::None) || input.is_gltf() {
+        return Ok(input);
+    }
+    let option = if model.lights.is_some() { "--lights file" } else { "--studio none" };
+    let name = &input.name;
+    Err(Failure::Usage(format!(
+        "{option} shows a model by the lights of its file, and {name} has none: only glTF files do; leave the option \
+         out, or choose --studio soft, hard, flat or clay"
+    )))
 }
 
 /// A scene around a model.
@@ -410,6 +428,29 @@ impl Input {
         let ending = |name: &str| name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase());
         let called = self.assets.model.as_ref().and_then(|(called, _)| ending(called));
         matches!(called.as_deref(), Some("glb" | "gltf")) || self.model_bytes().is_ok_and(|bytes| is_gltf(&bytes))
+    }
+
+    /// What a model by itself holds, at `time` in seconds.
+    ///
+    /// # Errors
+    /// It cannot be shown, or is none.
+    pub fn model_report(&self, time: f64) -> Result<ModelReport, Failure> {
+        match self.parsed.model_report(&self.assets, time) {
+            Some(report) => report.map_err(|e| Failure::Scene(e.faults)),
+            None => Err(Failure::Work(format!("{}: is no model", self.name))),
+        }
+    }
+
+    /// That pictures of a model are missing or damaged, a warning each.
+    pub fn faults_of_pictures(&self, report: &ModelReport) -> Vec<Diagnostic> {
+        let warning = |picture: &ModelPicture| Diagnostic {
+            severity: Severity::Warning,
+            place: None,
+            path: String::new(),
+            message: format!("{}: {:?}: {}", self.name, picture.file, picture.fault.as_deref().unwrap_or_default()),
+            hint: Some("magenta and black squares stand in for it".into()),
+        };
+        report.faulty_pictures().map(warning).collect()
     }
 
     /// The bytes of the model's own file.

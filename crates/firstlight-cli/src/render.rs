@@ -178,7 +178,7 @@ fn render_pictures(plan: &Plan, job: &Job, reading: &ReadingArgs, summary: &mut 
 }
 
 /// Has all views of a turntable look from one distance, the least at which each of them holds what is seen: as it is at
-/// 0 s, from where a camera is found.
+/// the moment for which a camera is found.
 ///
 /// # Errors
 /// Those of compiling.
@@ -192,7 +192,7 @@ fn keep_distance(input: &mut Input, moments: &mut [Moment], count: u32) -> Resul
                 let render = &mut input.parsed.desc.render;
                 (render.width, render.height) = moment.size;
                 let first = input.framing;
-                let distance = input.compile(0.0, true)?.scene.turntable_distance(&first, count);
+                let distance = input.compile(first.time, true)?.scene.turntable_distance(&first, count);
                 known.push((moment.size, distance));
                 distance
             }

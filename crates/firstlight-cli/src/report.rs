@@ -56,6 +56,12 @@ pub enum Failure {
 }
 
 impl Failure {
+    /// Warnings that `--strict` makes errors.
+    pub fn strict(mut warnings: Vec<Diagnostic>) -> Failure {
+        warnings.iter_mut().for_each(|warning| warning.severity = Severity::Error);
+        Failure::Scene(warnings)
+    }
+
     /// The program's exit code.
     pub fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {

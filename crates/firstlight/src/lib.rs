@@ -108,7 +108,10 @@ pub use material::{
     MetallicRoughnessDesc, NormalFix, PhongDesc, ShadowCatcherDesc, UnlitDesc,
 };
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
-pub use model::{MtlMaterials, MtlSettings, read_mtl};
+pub use model::{
+    ModelAnimation, ModelCounts, ModelExtension, ModelFile, ModelMaterial, ModelMesh, ModelPicture, ModelReport,
+    MtlMaterials, MtlSettings, read_mtl,
+};
 pub use render::{LightCounts, RenderStats, render, render_image};
 pub use scene::{
     Added, CameraHit, CastHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, MotionTo, RenderDesc, Scene,

@@ -469,7 +469,10 @@ impl<'a> Plan<'a> {
         }
         let found = input.framing;
         let (view, margin) = (self.view.unwrap_or(found.view), self.margin.unwrap_or(found.margin));
-        input.framing = Framing { view, margin, ..found };
+        // The camera stands still in all frames; of one moment there is a model by itself as it is then
+        let is_single = input.studio.is_some() && self.pictures.frames.is_none();
+        let time = if is_single { self.time } else { found.time };
+        input.framing = Framing { view, margin, time, ..found };
         Ok(())
     }
 

@@ -1,6 +1,6 @@
 //! Commands that answer: check, info, scenes, schema, completions, man, help.
 
-use crate::common::{COURSE, Folder};
+use crate::common::{COURSE, Folder, GLTF};
 
 #[test]
 fn check_says_ok() {
@@ -12,6 +12,12 @@ fn check_says_ok() {
         assert!(ran.stderr.is_empty(), "{}", ran.stderr);
     }
     assert_eq!(folder.names(), ["course.txt", "scene.toml"]);
+    let said: serde_json::Value = serde_json::from_str(&folder.run("check scene.toml --json").done().text()).unwrap();
+    assert_eq!(said, serde_json::json!({ "ok": true, "errors": [], "warnings": [], "notes": [] }));
+    folder.put("scene.toml", "[camera]\npositoin = [0, 0, 1]\n");
+    let said: serde_json::Value = serde_json::from_str(&folder.run("check scene.toml --json").exits(1).text()).unwrap();
+    assert_eq!(said["ok"], false);
+    assert!(said["errors"][0].as_str().is_some_and(|said| said.contains("positoin")), "{said}");
 }
 
 #[test]
@@ -51,6 +57,121 @@ fn info_is_json_for_programs() {
     assert_eq!(info["camera"]["name"], "front");
     assert_eq!(info["cameras"], serde_json::json!(["front", "side"]));
     assert!(info["bounds"]["min"][0].as_f64() <= Some(-5.0), "{text}");
+}
+
+#[test]
+fn info_says_what_a_model_holds() {
+    let folder = Folder::new();
+    folder.put("chair.gltf", GLTF);
+    let text = folder.run("info chair.gltf").done().text();
+    let length = GLTF.len();
+    for part in [
+        "format     glTF 2.0\n",
+        &format!("file       {length} bytes\n"),
+        "holds      3 nodes, 1 mesh, 1 primitive, 2 materials, 1 animation, 2 variants, 1 camera, 1 light\n",
+        "vertices   3, at 3 positions\n",
+        "triangles  1\n",
+        "bounds     min (0, 0, 0), max (1, 1, 0)\n",
+        "surface    not closed\n",
+        "edges      3 on a boundary, 0 of more than two faces, 0 turned\n",
+        "mesh       seat, mesh/0, 1 triangles, not closed\n",
+        "material   oak\nmaterial   walnut\n",
+        "animation  fold, 2 s\n",
+        "variant    light\nvariant    dark\n",
+        "camera     entry\n",
+        "light      kind point, name lamp\n",
+        "odd        the mesh not closed: edges of one triangle only: 3\n",
+        "odd        the mesh without normals: it is shown flat\n",
+    ] {
+        assert!(text.contains(part), "{part:?} is not in\n{text}");
+    }
+    assert!(!text.contains("not used"), "{text}");
+    // Where it is at a moment
+    let text = folder.run("info chair.gltf --time 2 --json").done().text();
+    let info: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(info["bounds"], serde_json::json!({ "min": [1.0, 0.0, 0.0], "max": [2.0, 1.0, 0.0] }));
+    assert_eq!((&info["meshes"][0]["triangles"], &info["animations"][0]["seconds"]), (&1.into(), &2.0.into()));
+    folder.put("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    folder.run("info a.obj --time 1").exits(2).says(&["--time has no meaning for a model, and a.obj is one"]);
+}
+
+#[test]
+fn what_is_odd_about_a_gltf_file_is_told() {
+    let folder = Folder::new();
+    let mut file: serde_json::Value = serde_json::from_str(GLTF).unwrap();
+    file["asset"]["generator"] = "a test".into();
+    file["images"] = serde_json::json!([{ "uri": "gone.png" }, { "uri": "spare.png" }]);
+    file["textures"] = serde_json::json!([{ "source": 0 }]);
+    file["materials"][0]["pbrMetallicRoughness"] = serde_json::json!({ "baseColorTexture": { "index": 0 } });
+    file["materials"][0]["doubleSided"] = false.into();
+    file["materials"].as_array_mut().unwrap().extend([serde_json::json!({ "name": "elm" }), serde_json::json!({})]);
+    file["nodes"][0]["scale"] = serde_json::json!([-200, 200, 200]);
+    file["extensionsUsed"] = serde_json::json!(["KHR_lights_punctual", "KHR_materials_sheen"]);
+    folder.put("chair.gltf", file.to_string());
+    let run = folder.run("info chair.gltf").done().says(&["chair.gltf: \"gone.png\": no such file"]);
+    let text = run.text();
+    for part in [
+        "format     glTF 2.0, by a test\n",
+        "material   elm, not used\nmaterial   material 3, not used\n",
+        "picture    gone.png, no such file, for base color\n",
+        "picture    spare.png, no such file, not used\n",
+        "extension  KHR_lights_punctual, read\nextension  KHR_materials_sheen, ignored\n",
+        "odd        the mesh open and single-sided: the camera looks through the back of it\n",
+        "odd        the mesh without the texture coordinates that the textures of \"chair.gltf/oak\" ask for\n",
+        "odd        the mesh mirrored: 1 times; fronts stay outside\n",
+        "odd        nodes with a negative scale: 1\n",
+        "odd        its longest side would be 200 m: its numbers may be millimetres or centimetres\n",
+        "odd        materials without a name: \"material 3\"\n",
+        "odd        materials that nothing has: \"elm\", \"material 3\"\n",
+        "odd        textures that are missing or damaged: \"gone.png\"\n",
+        "odd        pictures that no material uses: \"spare.png\"\n",
+        "odd        extensions that are ignored: \"KHR_materials_sheen\"\n",
+    ] {
+        assert!(text.contains(part), "{part:?} is not in\n{text}");
+    }
+    let told = ["gone.png", "uses the extension KHR_materials_sheen, which is not read"];
+    assert_eq!(folder.run("check chair.gltf").done().says(&told).text(), "ok\n");
+    for command in ["check", "info"] {
+        folder.run(&format!("{command} chair.gltf --strict")).exits(1).says(&told);
+    }
+    let answer = |options: &str, code| -> serde_json::Value {
+        serde_json::from_str(&folder.run(&format!("check chair.gltf --json{options}")).exits(code).text()).unwrap()
+    };
+    let said = answer("", 0);
+    assert_eq!((&said["ok"], said["warnings"].as_array().unwrap().len()), (&true.into(), 2), "{said}");
+    let said = answer(" --strict", 1);
+    assert_eq!((&said["ok"], said["errors"].as_array().unwrap().len()), (&false.into(), 2), "{said}");
+}
+
+#[test]
+fn what_is_odd_about_other_models_is_told() {
+    let folder = Folder::new();
+    let mesh =
+        "mtllib a.mtl gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 2\nusemtl oak\nf 1//1 2//1 3//1\nf 1//1 1//1 2//1\n";
+    folder.put("a.obj", mesh);
+    folder.put("a.mtl", "newmtl oak\nKd 1 1 1\nmap_Kd oak.png\nnewmtl elm\nmap_Kd elm.png\n");
+    let text = folder.run("info a.obj").done().text();
+    for part in [
+        "format     OBJ\n",
+        "           a.mtl, 61 bytes\n           gone.mtl, missing\n",
+        "normals    given, 3 not of length 1\n",
+        "material   oak\nmaterial   elm, not used\n",
+        "picture    oak.png, no such file, for diffuse\npicture    elm.png, no such file, not used\n",
+        "odd        the mesh with triangles without area, which are left out: 1\n",
+        "odd        the mesh without the texture coordinates that the textures of \"a.obj/oak\" ask for\n",
+        "odd        pictures that no material uses: \"elm.png\"\n",
+    ] {
+        assert!(text.contains(part), "{part:?} is not in\n{text}");
+    }
+    // What is made right where it is rendered is a note
+    let note = "note: a.obj: the mesh with normals whose length is not 1, which are made so: ";
+    folder.run("check a.obj").done().says(&[note, "triangles without area, which are left out: 1\n"]);
+    // A sound one
+    let sound = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    folder.put("sound.obj", sound);
+    let text = folder.run("info sound.obj").done().text();
+    assert!(text.contains("surface    closed\n") && text.contains("odd        the mesh without normals"), "{text}");
+    assert_eq!(text.matches("\nodd ").count(), 1, "{text}");
 }
 
 #[test]

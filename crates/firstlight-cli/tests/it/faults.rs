@@ -144,7 +144,7 @@ fn a_file_of_another_kind_is_one_line_that_says_what_it_is() {
         // The same under a model's name, and as the file of a mesh in a scene
         let what = said.split(", ").next().unwrap();
         folder.put("a.ply", bytes);
-        let ran = folder.run("render a.ply -o out.png").exits(1).says(&["error: a.ply: ", what, "not like a mesh"]);
+        let ran = folder.run("render a.ply -o out.png").exits(1).says(&["error: a.ply: ", what, "not like a model"]);
         assert_eq!(ran.stderr.lines().count(), 2, "{}", ran.stderr);
         assert!(!ran.stderr.contains("mesh[0]"), "{}", ran.stderr);
         folder.put("scene.toml", format!("{SCENE}[[mesh]]\nfile = \"a.ply\"\n"));
@@ -250,6 +250,20 @@ fn a_model_is_spoken_of_by_its_name() {
     // Those of what no face has are none
     folder.put("models/a.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\nv nan 0 0 255 0 0\n");
     assert_eq!(folder.run("check models/a.obj --strict").done().stderr, "");
+}
+
+#[test]
+fn lights_of_a_file_that_can_have_none_are_no_option() {
+    let folder = Folder::new();
+    folder.put("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    for option in ["--studio none", "--lights file"] {
+        for command in ["check", "info", "render"] {
+            let words = "shows a model by the lights of its file, and a.obj has none: only glTF files do; leave";
+            folder.run(&format!("{command} a.obj {option}")).exits(2).says(&[&format!("error: {option} {words}")]);
+        }
+    }
+    folder.put("a.gltf", GLTF);
+    folder.run("check a.gltf --studio none").done();
 }
 
 #[test]

@@ -118,11 +118,24 @@ fn models_play_what_they_have() {
         folder.run(&format!("render {what} {quick} -o a.png")).done().says(&["wrote a.png"]);
         Picture::decode(&folder.get("a.png"))
     };
-    // Half of the way to the right at 1 s
-    assert!(render("chair.gltf") == render("chair.gltf --time 0"));
-    let moved = render("chair.gltf --time 1");
-    assert!(moved != render("chair.gltf"));
-    assert!(moved == render("chair.gltf --time 1 --animation fold"));
+    // Half of the way to the right at 1 s; the camera of one moment goes with it
+    let rest = render("chair.gltf");
+    assert!(rest == render("chair.gltf --time 0"));
+    assert!(rest == render("chair.gltf --time 1"));
+    let frame = |options: &str| {
+        folder.run(&format!("render chair.gltf {quick} {options} -o a.png")).done();
+        Picture::decode(&folder.get("a.0024.png"))
+    };
+    let moved = frame("--frames 24..24");
+    assert!(moved != rest);
+    assert!(moved == frame("--frames 24..24 --animation fold"));
+    // From all sides of a turntable, and again by the receipt
+    folder.run(&format!("render chair.gltf {quick} --turntable 2 -o t#.png")).done();
+    folder.run(&format!("render chair.gltf {quick} --turntable 2 --time 1 -o m#.png")).done();
+    for [still, moving] in [["t0.png", "m0.png"], ["t1.png", "m1.png"]] {
+        assert!(Picture::decode(&folder.get(still)) == Picture::decode(&folder.get(moving)), "{moving}");
+    }
+    folder.run("verify m1.png --scene chair.gltf").done();
     for still in ["still.gltf", "still.obj"] {
         let rest = render(still);
         assert!(rest == render(&format!("{still} --time 1")), "{still}");

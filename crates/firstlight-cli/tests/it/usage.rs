@@ -90,7 +90,7 @@ const BAD: &[(&str, &[&str])] = &[
     ("render scene.toml --quiet --quiet", &["--quiet"]),
     ("render scene.toml --allow-dir", &["--allow-dir"]),
     ("check", &["SCENE"]),
-    ("check scene.toml --json", &["--json"]),
+    ("check scene.toml --time 1", &["--time"]),
     ("info", &["SCENE"]),
     ("scenes config99", &["config99", "config11"]),
     ("completions tcsh", &["tcsh", "bash", "zsh", "fish", "elvish", "powershell"]),

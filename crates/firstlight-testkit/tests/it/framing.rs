@@ -81,7 +81,7 @@ fn every_model_is_in_the_middle_of_its_picture() {
         for (view, margin) in
             [(View::default(), 0.04), (View::from_name("iso").unwrap(), 0.0), (View::new(-100.0, -35.0), 0.1)]
         {
-            let scene = compiled(&model, Framing { view, margin, distance: None }, UpAxis::Y);
+            let scene = compiled(&model, Framing { view, margin, ..Framing::default() }, UpAxis::Y);
             let free = SIZE.map(|side| margin * f64::from(SIZE[1]) / f64::from(side));
             // The corners of its triangles, projected: equal on both sides, the margin where it is narrowest
             let corners = mesh
@@ -112,8 +112,9 @@ fn every_model_is_in_the_middle_of_its_picture() {
 #[test]
 fn upwards_is_what_is_said() {
     let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/gallery/meshes/spot.obj");
-    let of =
-        |up| seen(&compiled(&model, Framing { view: View::new(0.0, 0.0), margin: 0.0, distance: None }, up)).unwrap();
+    let of = |up| {
+        seen(&compiled(&model, Framing { view: View::new(0.0, 0.0), margin: 0.0, ..Framing::default() }, up)).unwrap()
+    };
     // The calf from the front, and from above with its head on the near side: another outline
     let ([x, y], [other_x, other_y]) = (of(UpAxis::Y), of(UpAxis::Z));
     assert_eq!((y[0], y[1]), (0, SIZE[1]));

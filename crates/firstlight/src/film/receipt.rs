@@ -14,7 +14,7 @@ const MOST_LISTED: usize = 1000;
 
 /// How many entries **Pixels** has in the changelog, over all versions. It is part of the version in a receipt, so that
 /// two builds whose pictures differ never have the same version. The test below compares it with the changelog.
-const PIXELS_ENTRIES: u32 = 110;
+const PIXELS_ENTRIES: u32 = 111;
 
 /// The version in receipts.
 pub(super) fn version() -> String {
@@ -50,10 +50,14 @@ impl Scene {
         let background = if self.transparent { TRANSPARENT.to_owned() } else { numbers(background.linear) };
         entries.push(("background", background));
         entries.push(("shadow_terminator", shadow_terminator.name().to_owned()));
-        if let Some(Framing { view, margin, distance }) = framing {
+        if let Some(Framing { view, margin, distance, time }) = framing {
             entries.push(("view", numbers([view.azimuth_deg, view.elevation_deg])));
             entries.push(("margin", margin.to_string()));
             entries.extend(distance.map(|distance| ("view_distance", distance.to_string())));
+            // Nothing that stands still has a moment
+            if self.time.is_some() && *time != 0.0 {
+                entries.push(("view_time", time.to_string()));
+            }
         }
         entries.extend(model.iter().map(|model| ("model", model.to_json())));
         entries.extend(Self::matrices(&self.camera));

@@ -147,7 +147,8 @@ impl ReceiptSettings {
         let view = from.optional("view", |text| numbers(text, ' ').map(|[around, above]| View::new(around, above)))?;
         let framing = |view| {
             let distance = from.optional("view_distance", number)?;
-            Ok(Framing { view, margin: from.required("margin", number)?, distance })
+            let time = from.optional("view_time", number)?.unwrap_or(0.0);
+            Ok(Framing { view, margin: from.required("margin", number)?, distance, time })
         };
         let crop =
             |text: &str| numbers(text, ',').map(|[x, y, width, height]: [u32; 4]| Window { x, y, width, height });

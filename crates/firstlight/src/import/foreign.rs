@@ -43,6 +43,8 @@ enum FileFamily {
 pub(crate) enum WantedFile {
     Scene,
     Mesh,
+    /// A mesh, or a file with all that is shown of it.
+    Model,
 }
 
 impl Foreign {
@@ -51,6 +53,7 @@ impl Foreign {
         let wanted = match wanted {
             WantedFile::Scene => "a firstlight scene",
             WantedFile::Mesh => "a mesh",
+            WantedFile::Model => "a model",
         };
         format!("looks like {}, not like {wanted}", self.kind)
     }
@@ -70,6 +73,9 @@ impl Foreign {
             (FileFamily::Encoding, _) => "save it as UTF-8",
             (FileFamily::Materials, _) => "give the OBJ file that belongs to it, which brings its materials",
             (FileFamily::Picture | FileFamily::Other, WantedFile::Mesh) => "a mesh is a PLY, STL or OBJ file",
+            (FileFamily::Picture | FileFamily::Other, WantedFile::Model) => {
+                "a model is a glTF, GLB, OBJ, PLY or STL file"
+            }
             (FileFamily::Other, WantedFile::Scene) => {
                 "a scene is TOML or JSON text, a model a glTF, OBJ, PLY or STL file"
             }
@@ -230,7 +236,7 @@ fn text(bytes: &[u8], head: &[u8], wanted: WantedFile) -> Option<Foreign> {
         if has(b"\"asset\"") && parts.iter().any(|part| has(part)) {
             return is("a glTF model", FileFamily::Gltf);
         }
-        return if wanted == WantedFile::Mesh { is("JSON text", FileFamily::Other) } else { None };
+        return if wanted == WantedFile::Scene { None } else { is("JSON text", FileFamily::Other) };
     }
     if head.starts_with(b"<") {
         let low = head.to_ascii_lowercase();

@@ -45,6 +45,7 @@ pub(crate) use given::from_own_origin;
 pub use gltf::gltf_animations;
 pub(crate) use gltf::{
     Contained, Gltf, GltfFault, GltfFiles, GltfNode, JsonPlace, MeshAddress, OpenFault, Pose, Uri, WithContained,
+    called,
 };
 pub use mtl::MtlNote;
 pub use report::MeshReport;

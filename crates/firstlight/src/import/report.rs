@@ -42,6 +42,8 @@ pub struct MeshReport {
     pub has_normals: bool,
     /// Vertices whose normal is zero or not finite.
     pub bad_normals: u64,
+    /// Vertices whose normal has a direction and a length that is not 1, by more than a thousandth.
+    pub non_unit_normals: u64,
     /// How many sets of texture coordinates there are.
     pub uv_sets: u64,
     /// Whether it has colours.
@@ -73,6 +75,7 @@ impl MeshData {
         let count = |n: usize| n as u64;
         let used = self.used_vertices();
         let bad = |n: &[f32; 3]| !finite(n) || n.iter().all(|&x| x == 0.0);
+        let is_off = |n: &[f32; 3]| !bad(n) && (DVec3::from(n.map(f64::from)).length() - 1.0).abs() > 1e-3;
         let mut report = MeshReport {
             vertices: count(self.positions.len()),
             triangles: count(self.triangles.len()),
@@ -81,6 +84,7 @@ impl MeshData {
             unused_vertices: count(used.iter().filter(|used| !**used).count()),
             has_normals: !self.normals.is_empty(),
             bad_normals: count(parallel::count(self.normals.len(), CHUNK, |i| bad(&self.normals[i]))),
+            non_unit_normals: count(parallel::count(self.normals.len(), CHUNK, |i| is_off(&self.normals[i]))),
             uv_sets: count(self.uvs.len()),
             has_colors: !self.colors.is_empty(),
             bytes: self.bytes(),
@@ -221,6 +225,9 @@ mod tests {
         assert_eq!((report.non_finite_vertices, report.unused_vertices, report.bad_normals), (1, 1, 7));
         assert_eq!((report.boundary_edges, report.non_manifold_edges), (3, 0));
         assert_eq!(report.bounds, Some([[0.0; 3], [2.0, 1.0, 0.0]]));
+        assert_eq!(report.non_unit_normals, 0);
+        let long = MeshData { normals: vec![[0.0, 0.6, 0.8], [0.0, 0.0, 1.0005], [0.0, 2.0, 0.0]], ..mesh.clone() };
+        assert_eq!(long.report().non_unit_normals, 1);
         let points = MeshData { triangles: Vec::new(), ..mesh };
         assert_eq!(points.report().bounds, Some([[0.0; 3], [9.0, 9.0, 9.0]]));
         assert_eq!(MeshData::default().report(), MeshReport::default());

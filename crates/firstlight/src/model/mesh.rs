@@ -73,7 +73,7 @@ fn has_colors(data: &MeshData) -> bool {
 /// Adds the materials of the MTL files that faces of the mesh have; the answer are their names in the file.
 fn add_mtl(parts: &mut ModelParts, data: &MeshData, shown_mesh: &ShownMesh<'_>, size: f64) -> HashSet<String> {
     let ShownMesh { file, unlit, chosen, assets, .. } = *shown_mesh;
-    let wanted: HashSet<&str> = data.materials.iter().map(String::as_str).collect();
+    let named: HashSet<&str> = data.materials.iter().map(String::as_str).collect();
     let mut described = HashSet::new();
     // Many materials may have the same picture
     let alphas: RefCell<HashMap<String, Option<bool>>> = RefCell::default();
@@ -89,7 +89,7 @@ fn add_mtl(parts: &mut ModelParts, data: &MeshData, shown_mesh: &ShownMesh<'_>, 
             alphas.borrow_mut().insert(picture, has_alpha);
             has_alpha
         };
-        let is_wanted = |name: &str| wanted.contains(name) && !described.contains(name) && chosen(name).is_none();
+        let is_wanted = |name: &str| named.contains(name) && !described.contains(name) && chosen(name).is_none();
         let settings = MtlSettings {
             is_wanted: &is_wanted,
             texture_name: &|name| format!("{path}/{name}"),
@@ -108,6 +108,8 @@ fn add_mtl(parts: &mut ModelParts, data: &MeshData, shown_mesh: &ShownMesh<'_>, 
             let hint = note.hint.unwrap_or_default();
             parts.notes.push(ModelWarning { message: format!("{path}:{}: {}", note.line, note.message), hint });
         }
+        parts.spare.materials.extend(read.unwanted.into_iter().filter(|name| !named.contains(name.as_str())));
+        parts.spare.pictures.extend(read.unused_pictures.iter().map(|picture| join_path(&inside, picture)));
         for (name, mut texture) in read.textures {
             if let TextureDesc::Image(image) = &mut texture {
                 image.file.0 = join_path(&inside, &image.file.0);
@@ -125,8 +127,15 @@ fn add_mtl(parts: &mut ModelParts, data: &MeshData, shown_mesh: &ShownMesh<'_>, 
 /// The MTL files that the OBJ file `file` names, each once, with their paths in the scene. What cannot be read is told.
 fn mtl_files(parts: &mut ModelParts, data: &MeshData, file: &str, assets: &dyn Assets) -> Vec<(String, Vec<u8>)> {
     let folder = file.rsplit_once('/').map_or("", |(folder, _)| folder);
-    let mut files =
-        MtlFiles { folder, assets, left: MAX_MTL, asked: HashSet::new(), list: Vec::new(), warnings: vec![] };
+    let mut files = MtlFiles {
+        folder,
+        assets,
+        left: MAX_MTL,
+        asked: HashSet::new(),
+        list: vec![],
+        missing: vec![],
+        warnings: vec![],
+    };
     for line in &data.material_files {
         // A name may hold blanks; where there is no file of such a name, the line has several
         if files.is_new(line) && !files.read(line) {
@@ -135,6 +144,7 @@ fn mtl_files(parts: &mut ModelParts, data: &MeshData, file: &str, assets: &dyn A
                 if (words.len() == 1 || files.is_new(word) && !files.read(word)) && !files.is_full() {
                     let message = format!("{word:?}: there is no such file of materials");
                     files.warn(message, "its faces are of a light gray; an OBJ file needs its MTL files beside it");
+                    files.missing.push(join_path(folder, &word.replace('\\', "/")));
                 }
             }
         }
@@ -145,6 +155,8 @@ fn mtl_files(parts: &mut ModelParts, data: &MeshData, file: &str, assets: &dyn A
         }
     }
     parts.warnings.append(&mut files.warnings);
+    let read = files.list.iter().map(|(path, bytes)| (path.clone(), Some(bytes.len() as u64)));
+    parts.spare.files.extend(read.chain(files.missing.into_iter().map(|path| (path, None))));
     files.list
 }
 
@@ -158,6 +170,8 @@ struct MtlFiles<'a> {
     /// Names and paths that were asked for.
     asked: HashSet<String>,
     list: Vec<(String, Vec<u8>)>,
+    /// What cannot be read.
+    missing: Vec<String>,
     warnings: Vec<ModelWarning>,
 }
 
@@ -191,6 +205,7 @@ impl MtlFiles<'_> {
                 Err(error @ AssetError::Outside) => refused = Some((path, error)),
                 Err(error) => {
                     self.warn(format!("{path:?}: {error}"), "its faces are of a light gray");
+                    self.missing.push(path);
                     return true;
                 }
                 Ok(bytes) => {
@@ -203,6 +218,7 @@ impl MtlFiles<'_> {
         match refused {
             Some((path, error)) => {
                 self.warn(format!("{path:?}: {error}"), "its faces are of a light gray");
+                self.missing.push(path);
                 true
             }
             None => false,
@@ -266,6 +282,16 @@ mod tests {
         assert!(matches!(parts.materials[0].1, MaterialDesc::Phong(_)));
         assert_eq!(parts.materials[1].1, clay(false));
         assert_eq!(parts.warnings[0].message, "1 of its materials are described in no MTL file, \"other\" for one");
+    }
+
+    #[test]
+    fn what_no_face_has_is_told() {
+        let text = "newmtl red\nKd 1 0 0\nmap_Kd wood.png\nillum 1\nmap_Ks shine.png\nnewmtl blue\nmap_Kd sky.png\n";
+        let parts = described(&["red"], "sub/a.mtl none.mtl", &[("m/sub/a.mtl", text)]);
+        let files = [("m/sub/a.mtl".to_owned(), Some(text.len() as u64)), ("m/none.mtl".to_owned(), None)];
+        assert_eq!(parts.spare.files, files);
+        assert_eq!(parts.spare.materials, ["blue"]);
+        assert_eq!(parts.spare.pictures, ["m/sub/shine.png", "m/sub/sky.png"]);
     }
 
     #[test]

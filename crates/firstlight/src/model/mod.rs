@@ -8,10 +8,14 @@
 mod gltf;
 mod mesh;
 mod mtl;
+mod report;
 
-pub(crate) use gltf::{ShownModel, describe as describe_gltf};
+pub(crate) use gltf::{ShownModel, describe as describe_gltf, gltf_contents, gltf_uv_sets};
 pub(crate) use mesh::{ShownMesh, describe_mesh, describe_points};
 pub use mtl::{MtlMaterials, MtlSettings, read_mtl};
+pub use report::{
+    ModelAnimation, ModelCounts, ModelExtension, ModelFile, ModelMaterial, ModelMesh, ModelPicture, ModelReport,
+};
 
 use std::collections::{HashMap, HashSet};
 
@@ -37,6 +41,19 @@ pub(crate) struct ModelParts {
     pub warnings: Vec<ModelWarning>,
     /// What is told, though nothing is wrong for certain.
     pub notes: Vec<ModelWarning>,
+    /// What files of materials hold that is of no use here.
+    pub spare: SpareMaterials,
+}
+
+/// What the files of materials of an OBJ file hold besides the materials of its faces.
+#[derive(Debug, Default)]
+pub(crate) struct SpareMaterials {
+    /// The files, each with its length; `None` where it could not be read.
+    pub files: Vec<(String, Option<u64>)>,
+    /// Materials of no face.
+    pub materials: Vec<String>,
+    /// Pictures of no material of a face, by their paths in the scene.
+    pub pictures: Vec<String>,
 }
 
 /// A shape of a model and where it stands in the space of the file.

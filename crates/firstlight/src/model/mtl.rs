@@ -49,6 +49,10 @@ pub struct MtlMaterials {
     pub textures: Vec<(String, TextureDesc)>,
     /// What was left out or taken otherwise than written, in the order of lines.
     pub notes: Vec<MtlNote>,
+    /// The names of the materials that are not wanted, in the order of the file.
+    pub unwanted: Vec<String>,
+    /// The pictures that the file names and that none of the textures shows, sorted, relative to the MTL file.
+    pub unused_pictures: Vec<String>,
 }
 
 /// Reads the materials of a Wavefront MTL file from its bytes. All numbers are within what materials may have.
@@ -61,9 +65,20 @@ pub fn read_mtl(name: &str, bytes: &[u8], settings: &MtlSettings<'_>) -> Result<
     let mut notes = MtlNotes::default();
     let read = mtl::read(name, bytes, &mut notes)?;
     let mut file = Translation { settings, notes, textures: MtlTextures::default() };
-    let wanted = read.iter().filter(|material| (settings.is_wanted)(&material.name));
-    let materials = wanted.map(|material| (material.name.clone(), file.material(material))).collect();
-    Ok(MtlMaterials { materials, textures: file.textures.list, notes: file.notes.finish() })
+    let (wanted, others): (Vec<_>, Vec<_>) = read.iter().partition(|material| (settings.is_wanted)(&material.name));
+    let materials = wanted.iter().map(|material| (material.name.clone(), file.material(material))).collect();
+    let textures = file.textures.list;
+    let picture = |(_, texture): &'_ (String, TextureDesc)| match texture {
+        TextureDesc::Image(image) => Some(image.file.0.clone()),
+        _ => None,
+    };
+    let used: HashSet<String> = textures.iter().filter_map(picture).collect();
+    let pictures = read.iter().flat_map(|material| material.maps.values()).map(|picture| &picture.file);
+    let mut unused_pictures: Vec<String> = pictures.filter(|picture| !used.contains(*picture)).cloned().collect();
+    unused_pictures.sort();
+    unused_pictures.dedup();
+    let unwanted = others.iter().map(|material| material.name.clone()).collect();
+    Ok(MtlMaterials { materials, textures, notes: file.notes.finish(), unwanted, unused_pictures })
 }
 
 /// The textures so far: each picture once for each way it lies.

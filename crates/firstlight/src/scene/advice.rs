@@ -464,7 +464,8 @@ mod tests {
             let mut parsed = Parsed::of_model("a.obj", "a.obj", &StudioSettings::default());
             parsed.desc.render.antialiasing = antialiasing;
             (parsed.desc.render.width, parsed.desc.render.height) = (32, 32);
-            let framing = Framing { view: View::from_name("right").expect("is one"), margin: 0.1, distance: None };
+            let framing =
+                Framing { view: View::from_name("right").expect("is one"), margin: 0.1, ..Framing::default() };
             let options =
                 CompileOptions { studio: Some(StudioSettings::default()), framing, ..CompileOptions::default() };
             let compiled = parsed.compile(&assets, &options).unwrap_or_else(|error| panic!("{error}"));

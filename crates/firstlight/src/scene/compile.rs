@@ -223,7 +223,7 @@ impl SceneDesc {
         geometry: Option<&Geometry>,
         (source, files): (&SceneDesc, &MeshFiles<'_>),
     ) -> Added {
-        let Framing { view, margin, distance } = options.framing;
+        let Framing { view, margin, distance, time } = options.framing;
         cx.between("view.azimuth_deg", view.azimuth_deg, -360.0, 360.0, Some("in degrees; 0 is in front"));
         cx.between("view.elevation_deg", view.elevation_deg, -90.0, 90.0, Some("in degrees; 90 is straight above"));
         cx.between("margin", margin, 0.0, Framing::MAX_MARGIN, Some("a part of the picture's shorter side"));
@@ -231,15 +231,16 @@ impl SceneDesc {
             let [least, most] = Framing::DISTANCES;
             cx.between("distance", distance, least, most, Some("from the middle of what is seen, in metres"));
         }
+        cx.between("framing.time", time, -MAX_TIME, MAX_TIME, Some("the moment that is framed, in seconds"));
         if cx.has_errors() {
             return Added::default();
         }
-        // What moves is framed as it is at 0 s, so that a camera that was found stands still in all frames
-        let still = if self.cameras.is_empty() && cx.keyed && options.time != 0.0 {
-            let mut at_zero = CompileContext::at_time(0.0);
+        // What moves is framed as it is at one moment, so that a camera that was found stands still in all frames
+        let still = if self.cameras.is_empty() && cx.keyed && options.time != time {
+            let mut there = CompileContext::at_time(time);
             let files = &mut files.again();
-            let said = source.with_models(&mut at_zero, assets, files);
-            compile_shapes(&said, materials, false, &mut at_zero, assets, files).map(|still| (still, at_zero.origin))
+            let said = source.with_models(&mut there, assets, files);
+            compile_shapes(&said, materials, false, &mut there, assets, files).map(|still| (still, there.origin))
         } else {
             None
         };

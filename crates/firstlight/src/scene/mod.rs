@@ -14,6 +14,7 @@ mod layers;
 mod light_spheres;
 mod links;
 mod model;
+mod model_report;
 mod models;
 mod motion;
 mod normals;

@@ -83,6 +83,9 @@ pub struct Framing {
     /// [`Scene::turntable_distance`]. `None`: as near as the margin lets it be, with the outline in the middle of the
     /// picture.
     pub distance: Option<f64>,
+    /// The moment at which what moves is framed, in seconds: 0, so that the camera stands still in all moments. That
+    /// of a single picture frames it as it is there.
+    pub time: f64,
 }
 
 impl Framing {
@@ -94,7 +97,7 @@ impl Framing {
 
 impl Default for Framing {
     fn default() -> Self {
-        Framing { view: View::default(), margin: 0.04, distance: None }
+        Framing { view: View::default(), margin: 0.04, distance: None, time: 0.0 }
     }
 }
 
@@ -366,7 +369,7 @@ mod tests {
             let high = points.iter().copied().reduce(DVec3::max).unwrap_or_default();
             let support = |d: DVec3| points.iter().map(|p| p.dot(d)).fold(f64::NEG_INFINITY, f64::max);
             for (size, margin) in [([300.0, 300.0], 0.04), ([400.0, 100.0], 0.0), ([100.0, 300.0], 0.2)] {
-                let framing = Framing { view: *view, margin, distance: None };
+                let framing = Framing { view: *view, margin, ..Framing::default() };
                 let camera = framing_of(&support, [low, high], &framing, size);
                 let [x, y] = shown(&camera, &points, size);
                 let free = [0, 1].map(|axis| margin * size[0].min(size[1]) / size[axis]);
@@ -390,7 +393,7 @@ mod tests {
     fn a_ball_is_seen_as_round_as_it_is() {
         // The cone around a ball of radius 1 at the distance d has the sine 1 / d
         let support = |d: DVec3| d.length();
-        let framing = Framing { view: View::new(0.0, 0.0), margin: 0.1, distance: None };
+        let framing = Framing { view: View::new(0.0, 0.0), margin: 0.1, ..Framing::default() };
         let camera = framing_of(&support, [DVec3::NEG_ONE, DVec3::ONE], &framing, [200.0, 100.0]);
         let tan = 0.8 * pxfm::f_tan(FOV_Y_DEG.to_radians() * 0.5);
         let distance = (1.0 + 1.0 / (tan * tan)).sqrt();
@@ -442,7 +445,7 @@ mod tests {
             (View::new(-350.0, -40.0), 4, [400.0, 100.0]),
             (View::new(0.0, 90.0), 3, [9.0, 9.0]),
         ] {
-            let framing = Framing { view: first, margin: 0.1, distance: None };
+            let framing = Framing { view: first, margin: 0.1, ..Framing::default() };
             let of = |number| Framing { view: first.turned(number, count), ..framing };
             let all = (0..count).map(|number| Aim::new(&support, [low, high], &of(number), size).distance());
             let distance = all.fold(0.0, f64::max);

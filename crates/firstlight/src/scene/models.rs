@@ -10,7 +10,7 @@ use crate::context::{Assets, CompileContext};
 use crate::describe::Family;
 use crate::describe::node::quoted;
 use crate::error::{SceneError, Severity};
-use crate::import::{MeshFormat, OpenFault, is_gltf, is_point_set};
+use crate::import::{MeshFormat, OpenFault, WantedFile, foreign, is_gltf, is_point_set};
 use crate::material::MaterialDesc;
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::model::{ModelParts, ShownMesh, ShownModel, describe_gltf, describe_mesh, describe_points};
@@ -18,10 +18,20 @@ use crate::shape::{MeshFiles, ModelDesc, ShapeDesc, UpAxis, load_mesh_file, read
 use crate::transform::TransformDesc;
 
 /// What kind of model a file is.
-enum ModelKind {
+pub(super) enum ModelKind {
     Gltf,
     Mesh(MeshFormat),
     Points,
+}
+
+impl ModelKind {
+    /// The axis that points upwards, unless it is said.
+    pub(super) fn up(&self) -> UpAxis {
+        match self {
+            ModelKind::Mesh(MeshFormat::Stl) => UpAxis::Z,
+            _ => UpAxis::Y,
+        }
+    }
 }
 
 impl SceneDesc {
@@ -200,7 +210,7 @@ fn transform_of(affine: &DAffine3) -> Option<Box<TransformDesc>> {
 
 impl ModelDesc {
     /// What the file describes, and the way from its axes to those of scenes. `None` after an error.
-    fn parts(
+    pub(super) fn parts(
         &self,
         cx: &mut CompileContext,
         assets: &dyn Assets,
@@ -209,10 +219,7 @@ impl ModelDesc {
         let (kind, file) = (self.kind(cx, assets, files)?, self.file.0.as_str());
         self.refuse_fields(cx, matches!(kind, ModelKind::Gltf));
         let chosen = |name: &str| self.materials.get(name).map(str::to_owned);
-        let up = match kind {
-            ModelKind::Mesh(MeshFormat::Stl) => UpAxis::Z,
-            _ => UpAxis::Y,
-        };
+        let up = kind.up();
         let (parts, names) = match kind {
             ModelKind::Points => (describe_points(file, self.unlit), Vec::new()),
             ModelKind::Mesh(_) => {
@@ -264,15 +271,25 @@ impl ModelDesc {
                 cx.unknown("materials", "material of the file", name, &names);
             }
         }
+        self.tell(cx, &parts);
+        Some((parts, self.upright(up)))
+    }
+
+    /// Says what the reader had to say.
+    pub(super) fn tell(&self, cx: &mut CompileContext, parts: &ModelParts) {
+        let file = quoted(&self.file.0);
         for warning in &parts.warnings {
-            cx.warning("file", format!("{}: {}", quoted(file), warning.message), Some(&warning.hint));
+            cx.warning("file", format!("{file}: {}", warning.message), Some(&warning.hint));
         }
         for note in &parts.notes {
-            cx.advise("file", format!("{}: {}", quoted(file), note.message), Some(&note.hint));
+            cx.advise("file", format!("{file}: {}", note.message), Some(&note.hint));
         }
+    }
+
+    /// The way from the axes of the file, of which `up` is upwards unless it is said, to those of scenes.
+    pub(super) fn upright(&self, up: UpAxis) -> DAffine3 {
         let turned = DAffine3 { matrix3: DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y), translation: DVec3::ZERO };
-        let up = if self.up.unwrap_or(up) == UpAxis::Z { turned } else { DAffine3::IDENTITY };
-        Some((parts, up))
+        if self.up.unwrap_or(up) == UpAxis::Z { turned } else { DAffine3::IDENTITY }
     }
 
     /// Refuses materials that the scene does not describe, and goes on without them.
@@ -293,7 +310,12 @@ impl ModelDesc {
     }
 
     /// What kind of file it is: by its ending, else by its content. `None` after an error.
-    fn kind(&self, cx: &mut CompileContext, assets: &dyn Assets, files: &mut MeshFiles<'_>) -> Option<ModelKind> {
+    pub(super) fn kind(
+        &self,
+        cx: &mut CompileContext,
+        assets: &dyn Assets,
+        files: &mut MeshFiles<'_>,
+    ) -> Option<ModelKind> {
         let file = &self.file.0;
         let ending = file.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase());
         match ending.as_deref() {
@@ -307,14 +329,21 @@ impl ModelDesc {
             Some(ModelKind::Gltf)
         } else if is_point_set(&bytes[..bytes.len().min(HEAD)]) {
             Some(ModelKind::Points)
+        } else if let Some(foreign) = foreign(&bytes, WantedFile::Model) {
+            let message = format!("{}: {}", quoted(file), foreign.message(WantedFile::Model));
+            cx.error("file", message, Some(foreign.hint(WantedFile::Model)));
+            None
+        } else if let Some(format) = MeshFormat::detect(file, &bytes) {
+            Some(ModelKind::Mesh(format))
         } else {
-            // What is none of them is refused where it is read
-            Some(ModelKind::Mesh(MeshFormat::detect(file, &bytes).unwrap_or(MeshFormat::Ply)))
+            let message = format!("{}: is not a model of a known kind", quoted(file));
+            cx.error("file", message, Some("give a glTF, GLB, OBJ, PLY or STL file"));
+            None
         }
     }
 
     /// Refuses fields that files of the other kinds have no use for.
-    fn refuse_fields(&self, cx: &mut CompileContext, is_gltf: bool) {
+    pub(super) fn refuse_fields(&self, cx: &mut CompileContext, is_gltf: bool) {
         if let Some(time) = self.time {
             cx.between("time", time, -1e9, 1e9, Some("in seconds"));
         }

@@ -111,8 +111,13 @@ impl Parsed {
         Self { model, ..SceneDesc::of_model(file, settings).into() }
     }
 
+    /// What the description calls the file of a model by itself, and how that is shown.
+    pub(super) fn model_file(&self) -> Option<(&str, &StudioSettings)> {
+        self.model.as_ref().map(|ModelFile { file, settings, .. }| (file.as_str(), settings))
+    }
+
     /// The same diagnostics; of a model by itself, about its file.
-    fn of_file(&self, mut list: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    pub(super) fn of_file(&self, mut list: Vec<Diagnostic>) -> Vec<Diagnostic> {
         let Some(ModelFile { name, file, .. }) = &self.model else { return list };
         for diagnostic in &mut list {
             let path = std::mem::take(&mut diagnostic.path);

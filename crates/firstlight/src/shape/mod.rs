@@ -53,7 +53,7 @@ pub(crate) use common::Common;
 pub(crate) use cover::{Cover, LightSeen};
 pub(crate) use disk::{Disk, DiskShadow};
 pub(crate) use mesh::{JoinedPart, Mesh, MeshBuilder, MeshSource, NamedSets, TrianglePoint};
-pub(crate) use mesh::{load_mesh_file, read_mesh_bytes, unreadable};
+pub(crate) use mesh::{load_mesh_file, parse_mesh_file, read_mesh_bytes, unreadable};
 pub(crate) use parallelogram::{ParallelogramShadow, PlaneSide};
 pub(crate) use placement::Placement;
 pub(crate) use plane::UnboundedPlane;

@@ -45,6 +45,22 @@ struct SampledKeys<'a> {
 }
 
 impl Gltf {
+    /// The moment of the last key of an animation, in seconds; 0 without keys.
+    pub(crate) fn duration(&self, animation: usize) -> Result<f64, GltfFault> {
+        let mut last = 0.0f64;
+        for sampler in self.root().nth("animations", animation)?.list("samplers")? {
+            let input = sampler.need("input")?;
+            // Files have to say it; of those that do not, the keys do
+            let said = self.root().of_index("accessors", &input)?.get("max").and_then(|max| max.numbers().ok());
+            let end = match said {
+                Some([end]) => Some(end),
+                None => self.numbers(&input)?.last().map(|end| f64::from(*end)),
+            };
+            last = last.max(end.unwrap_or(0.0));
+        }
+        Ok(last)
+    }
+
     /// What the animation says at the moment, node by node.
     pub(super) fn animate(&self, pose: &Pose, nodes: &mut [AnimatedNode]) -> Result<(), GltfFault> {
         let animation = self.root().nth("animations", pose.animation)?;

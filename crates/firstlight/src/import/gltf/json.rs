@@ -4,6 +4,18 @@ use serde_json::Value;
 
 use super::GltfFault;
 
+/// `base color` of `baseColor`.
+fn words(key: &str) -> String {
+    let mut words = String::with_capacity(key.len() + 2);
+    for c in key.chars() {
+        if c.is_uppercase() && !words.is_empty() {
+            words.push(' ');
+        }
+        words.extend(c.to_lowercase());
+    }
+    words
+}
+
 /// A value of the JSON and where it stands.
 #[derive(Clone, Debug)]
 pub(crate) struct JsonPlace<'a> {
@@ -59,6 +71,31 @@ impl<'a> JsonPlace<'a> {
     /// An extension of this object, with this name.
     pub fn extension(&self, name: &str) -> Option<JsonPlace<'a>> {
         self.get("extensions")?.get(name)
+    }
+
+    /// The textures that a material names, at any depth, with what for: `base color` of `baseColorTexture`.
+    pub fn textures(&self) -> Vec<(String, usize)> {
+        let (mut found, mut open) = (Vec::new(), vec![self.value]);
+        while let Some(value) = open.pop() {
+            for (key, value) in value.as_object().into_iter().flatten() {
+                let index = value.get("index").and_then(Value::as_u64).and_then(|index| usize::try_from(index).ok());
+                match (key.strip_suffix("Texture"), index) {
+                    (Some(of), Some(index)) => found.push((words(of), index)),
+                    _ => open.push(value),
+                }
+            }
+        }
+        found.sort();
+        found.dedup();
+        found
+    }
+
+    /// The images that a texture names, in extensions too.
+    pub fn sources(&self) -> Vec<usize> {
+        let extensions = self.get("extensions").and_then(|at| at.value.as_object());
+        let others = extensions.into_iter().flatten().map(|(_, extension)| extension);
+        let all = std::iter::once(self.value).chain(others).filter_map(|value| value.get("source")?.as_u64());
+        all.filter_map(|index| usize::try_from(index).ok()).collect()
     }
 
     /// How many elements the array at `key` has; without one, 0.

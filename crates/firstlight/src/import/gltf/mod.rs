@@ -73,6 +73,10 @@ pub(crate) struct Gltf {
     folder: String,
     /// BLAKE3 of the file and of all its buffers.
     pub hash: [u8; 32],
+    /// Whether it is a binary container.
+    pub is_binary: bool,
+    /// Bytes of the file itself.
+    pub length: u64,
     /// Bytes that may still be taken.
     budget: AtomicU64,
     /// The nodes of the last pose: each of many meshes with a skin asks for them.
@@ -108,7 +112,16 @@ impl Gltf {
             buffers.push(buffer.map(Arc::new));
         }
         let budget = AtomicU64::new(BUDGET.saturating_add(length.saturating_mul(BUDGET_TIMES)));
-        Ok(Gltf { json, buffers, folder, hash: *hasher.finalize().as_bytes(), budget, posed: Mutex::default() })
+        Ok(Gltf {
+            json,
+            buffers,
+            folder,
+            hash: *hasher.finalize().as_bytes(),
+            is_binary: bytes.starts_with(b"glTF"),
+            length: bytes.len() as u64,
+            budget,
+            posed: Mutex::default(),
+        })
     }
 
     /// Its JSON.
@@ -116,10 +129,23 @@ impl Gltf {
         JsonPlace::root(&self.json)
     }
 
-    /// The names of its materials.
+    /// The files of its buffers, each with its length; `None` where it could not be read.
+    pub fn buffer_files(&self) -> Vec<(String, Option<u64>)> {
+        let places = self.root().list("buffers").unwrap_or_default();
+        let file = |(at, buffer): (&JsonPlace<'_>, &Result<Arc<Vec<u8>>, GltfFault>)| match Uri::of(
+            at.text_of("uri")?,
+            &self.folder,
+        ) {
+            Uri::File(path) => Some((path, buffer.as_ref().ok().map(|bytes| bytes.len() as u64))),
+            Uri::Data(_) | Uri::Scheme(_) => None,
+        };
+        places.iter().zip(&self.buffers).filter_map(file).collect()
+    }
+
+    /// What its materials are called.
     pub fn material_names(&self) -> Vec<String> {
         let materials = self.root().list("materials").unwrap_or_default();
-        materials.iter().filter_map(|material| material.text_of("name")).map(str::to_owned).collect()
+        materials.iter().enumerate().map(|(index, material)| called(material, index)).collect()
     }
 
     /// As [`nodes`](Self::nodes), computed once for a pose.
@@ -174,6 +200,12 @@ impl Gltf {
             None => Err(image.fault("has neither \"uri\" nor \"bufferView\"")),
         }
     }
+}
+
+/// What material number `index` is called: by its name, and without one `material 3`.
+pub(crate) fn called(material: &JsonPlace<'_>, index: usize) -> String {
+    let name = material.text_of("name").filter(|name| !name.is_empty());
+    name.map_or_else(|| format!("material {index}"), str::to_owned)
 }
 
 /// The names of the animations of a glTF file, in its order; empty where an animation has none. Of what is no glTF file

@@ -32,11 +32,16 @@ const CONVERT: &[(&str, &str)] = &[
     ("EXT_texture_avif", "convert its pictures: `npx @gltf-transform/cli webp in.glb out.glb`"),
 ];
 
+/// Whether an extension is read, or changes nothing that could be seen.
+pub(super) fn is_read(name: &str) -> bool {
+    READ.contains(&name)
+}
+
 /// Refuses a file that cannot be shown without an extension that is not read; warns of those that it could do without.
 pub(super) fn check(root: &JsonPlace<'_>, warnings: &mut Vec<ModelWarning>) -> Result<(), GltfFault> {
     let names = |key: &str| -> Result<Vec<&str>, GltfFault> {
         let names = root.list(key)?.iter().map(|name| name.text()).collect::<Result<Vec<_>, _>>()?;
-        Ok(names.into_iter().filter(|name| !READ.contains(name)).collect())
+        Ok(names.into_iter().filter(|name| !is_read(name)).collect())
     };
     let required = names("extensionsRequired")?;
     let shown = |name: &str| name.chars().take(80).collect::<String>();

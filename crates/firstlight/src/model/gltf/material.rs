@@ -8,7 +8,7 @@ use super::super::{ModelParts, ModelWarning, UniqueNames, clay, material_name, s
 use super::{ShownModel, no_such};
 use crate::describe::{Channel, ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc};
 use crate::image::read::{Limits, read_header};
-use crate::import::{Gltf, GltfFault, JsonPlace, Uri};
+use crate::import::{Gltf, GltfFault, JsonPlace, Uri, called};
 use crate::material::{AlphaMode, MaterialCommonDesc, MaterialDesc, MetallicRoughnessDesc, UnlitDesc};
 use crate::texture::{Filter, ImageTextureDesc, TextureDesc, Wrap};
 
@@ -45,7 +45,7 @@ enum PictureAddress {
     File(String),
 }
 
-const VARIANTS: &str = "KHR_materials_variants";
+pub(super) const VARIANTS: &str = "KHR_materials_variants";
 /// The largest picture that is looked at for alpha, in bytes.
 const MAX_PICTURE: u64 = 1 << 30;
 /// How much of the light behind thin glass is seen at most.
@@ -101,19 +101,15 @@ impl<'a> Materials<'a> {
             return Ok(name.clone());
         }
         let at = number.map(|number| self.gltf.root().of_index("materials", &number)).transpose()?;
-        let own = match &at {
-            Some(at) => at.text_of("name").unwrap_or_default(),
-            None => "",
+        let own = match (&at, index) {
+            (Some(at), Some(index)) => called(at, index),
+            _ if has_colors => "default with colours".to_owned(),
+            _ => "default".to_owned(),
         };
-        let name = match (self.shown.chosen)(own) {
+        let chosen = index.and_then(|_| (self.shown.chosen)(&own));
+        let name = match chosen {
             Some(chosen) => chosen,
             None => {
-                let own = match (own, index) {
-                    ("", Some(index)) => format!("material {index}"),
-                    ("", None) if has_colors => "default with colours".to_owned(),
-                    ("", None) => "default".to_owned(),
-                    (own, _) => own.to_owned(),
-                };
                 let name = self.material_names.unique(material_name(self.shown.file, &own, self.shown.unlit));
                 let material = match &at {
                     Some(at) => self.material(at, &own)?,

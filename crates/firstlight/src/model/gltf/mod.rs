@@ -2,8 +2,10 @@
 //!
 //! - this file: nodes, instances, lights, cameras;
 //! - [`material`]: materials, textures, and the extensions that change them;
-//! - [`extensions`]: what is read of all extensions, and what to do about the others.
+//! - [`extensions`]: what is read of all extensions, and what to do about the others;
+//! - [`contents`]: what a file holds, for reports.
 
+mod contents;
 mod extensions;
 mod material;
 #[cfg(test)]
@@ -20,6 +22,7 @@ use crate::light::{DirectionalDesc, LightDesc, PointDesc, SpotDesc};
 use crate::math::{DAffine3, DVec3};
 use crate::shape::{GroupDesc, InstanceDesc, MeshDesc, ShapeDesc};
 use crate::transform::is_invertible;
+pub(crate) use contents::{gltf_contents, gltf_uv_sets};
 use material::Materials;
 
 /// What is shown of a file.

@@ -429,9 +429,18 @@ fn materials_are_called_as_the_file_calls_them() {
     // Without a material: matte, and white below the colours of vertices
     assert_eq!(parts.materials[3].1, clay(false));
     assert_eq!(parts.materials[4].1, clay(true));
-    let unlit = describe(&open(file, &[]), &ShownModel { unlit: true, ..PLAIN }).expect("is read");
+    let unlit = describe(&open(file.clone(), &[]), &ShownModel { unlit: true, ..PLAIN }).expect("is read");
     assert!(unlit.materials.iter().all(|(_, material)| matches!(material, MaterialDesc::Unlit(_))));
     assert_eq!(unlit.materials[0].0, "m/a.gltf/default unlit");
+    // So they are replaced by those of the scene, and what has none is no material of that name
+    let chosen = |name: &str| matches!(name, "material 2" | "default").then(|| "red".to_owned());
+    let gltf = open(file, &[]);
+    assert_eq!(gltf.material_names(), ["default", "default", "material 2"]);
+    let parts = describe(&gltf, &ShownModel { chosen: &chosen, ..PLAIN }).expect("is read");
+    let names: Vec<&str> = parts.materials.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["m/a.gltf/default", "m/a.gltf/default with colours"]);
+    let ShapeDesc::Mesh(mesh) = &parts.shapes[0].shape else { panic!("is a mesh") };
+    assert_eq!(mesh.materials[..3], ["red", "red", "red"]);
 }
 
 /// What a file with one node with this extension, turned and moved, brings.
