@@ -196,7 +196,7 @@ impl<'a> TextureRequests<'a> {
             }
         }
         let read: Vec<Result<PictureFile, TextureFault>> =
-            parallel::collect(files.len(), |file| read_file(self.assets, &files[file].0));
+            parallel::collect(files.len(), |file| read_file(self.assets, files[file].0));
         // Each content once, however many files have it
         let mut pictures: Vec<SharedPicture> = Vec::new();
         let mut picture_of: HashMap<[u8; 32], usize> = HashMap::new();
