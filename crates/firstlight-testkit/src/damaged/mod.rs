@@ -5,10 +5,10 @@
 //! statements of MTL, numbers of buffers. The fourth time it is blind: bytes are changed, cut off and repeated. Nothing
 //! here needs the library, so that tests of the program can damage files too.
 //!
-//! - [`models`]: whole models, of all formats, made here;
-//! - [`json`]: values of glTF;
-//! - [`text`]: lines and words of OBJ, MTL and of texts in general;
-//! - [`bytes`]: buffers, chunks, and whatever is no text.
+//! - `models`: whole models, of all formats, made here;
+//! - `json`: values of glTF;
+//! - `text`: lines and words of OBJ, MTL and of texts in general;
+//! - `bytes`: buffers, chunks, and whatever is no text.
 
 mod bytes;
 mod json;
