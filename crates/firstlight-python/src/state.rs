@@ -111,6 +111,10 @@ impl State {
         let mut framing = self.shown.framing;
         framing.view = wanted.view.unwrap_or(framing.view);
         framing.margin = wanted.margin.unwrap_or(framing.margin);
+        // A model by itself is framed as it is then
+        if self.shown.studio.is_some() {
+            framing.time = wanted.time.unwrap_or(0.0);
+        }
         let played = self.played(wanted);
         let other = played.as_ref().and_then(|studio| self.shown.with(&self.parsed.desc, studio));
         let options = CompileOptions {

@@ -427,7 +427,7 @@ mod tests {
         let mut random = |below: usize| numbers.below(below as u32) as usize;
         for name in FILES.into_iter().chain(["progressive_cat.jpg", "bricks-color.jpeg"]) {
             let bytes = data(name);
-            for round in 0..2000 {
+            for round in 0..400 {
                 let mut damaged = bytes.clone();
                 for _ in 0..=random(4) {
                     let at = random(damaged.len());

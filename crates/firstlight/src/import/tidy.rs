@@ -149,7 +149,7 @@ mod tests {
         MeshData {
             positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]],
             normals: normals.to_vec(),
-            colors: (0..4).map(|i| [i as f32; 4]).collect(),
+            colors: (0..4).map(|i| [i as f32, i as f32, i as f32, 1.0]).collect(),
             triangles: vec![[0, 1, 2], [1, 0, 3]],
             ..MeshData::default()
         }
@@ -181,7 +181,7 @@ mod tests {
         assert_eq!(mesh.triangles, [[4, 1, 2], [1, 5, 3]]);
         assert_eq!(mesh.normals[1..], [[0.0, 0.6, 0.8], up, [0.0, -1.0, 0.0], up, [0.0, -1.0, 0.0]]);
         assert_eq!((mesh.positions[4], mesh.positions[5]), ([0.0; 3], [0.0; 3]));
-        assert_eq!((mesh.colors[4], mesh.colors.len()), ([0.0; 4], 6));
+        assert_eq!((mesh.colors[4], mesh.colors.len()), ([0.0, 0.0, 0.0, 1.0], 6));
         assert!(mesh.fault().is_none());
         // On the side of the others, also where the corners run the other way around
         let mut mesh = step([[f32::NAN; 3], [0.0, 0.0, -7.0], [0.0, 0.0, -1.0], [0.0; 3]]);

@@ -45,12 +45,12 @@ pub struct Parsed {
     sources: Sources,
     /// A whole text or a group of named things is missing, so that compiling would complain without reason.
     incomplete: bool,
-    model: Option<ModelFile>,
+    model: Option<BareModel>,
 }
 
 /// The model that a scene is about.
 #[derive(Clone, Debug)]
-struct ModelFile {
+struct BareModel {
     /// What messages call it.
     name: String,
     /// What the description calls it.
@@ -107,18 +107,18 @@ impl Parsed {
     /// A scene that shows a model, as [`SceneDesc::of_model`] makes it; what is wrong with it is said of the file,
     /// which is called `name`, and not of a description that nobody wrote.
     pub fn of_model(name: &str, file: &str, settings: &StudioSettings) -> Self {
-        let model = Some(ModelFile { name: name.to_owned(), file: file.to_owned(), settings: settings.clone() });
+        let model = Some(BareModel { name: name.to_owned(), file: file.to_owned(), settings: settings.clone() });
         Self { model, ..SceneDesc::of_model(file, settings).into() }
     }
 
     /// What the description calls the file of a model by itself, and how that is shown.
     pub(super) fn model_file(&self) -> Option<(&str, &StudioSettings)> {
-        self.model.as_ref().map(|ModelFile { file, settings, .. }| (file.as_str(), settings))
+        self.model.as_ref().map(|BareModel { file, settings, .. }| (file.as_str(), settings))
     }
 
     /// The same diagnostics; of a model by itself, about its file.
     pub(super) fn of_file(&self, mut list: Vec<Diagnostic>) -> Vec<Diagnostic> {
-        let Some(ModelFile { name, file, .. }) = &self.model else { return list };
+        let Some(BareModel { name, file, .. }) = &self.model else { return list };
         for diagnostic in &mut list {
             let path = std::mem::take(&mut diagnostic.path);
             let field =

@@ -33,8 +33,8 @@ shape_table! {
         pub file: FilePath,
         /// The axis of the file that points upwards; without it y, and z for STL.
         pub up: Option<UpAxis> = None,
-        /// Materials of the scene in place of those of the file, by their names in the file; one of a glTF file without a
-        /// name is `material 3` by its number, from 0 on.
+        /// Materials of the scene in place of those of the file, by their names in the file; one of a glTF file without
+        /// a name is `material 3` by its number, from 0 on.
         pub materials: NameMap = NameMap::default(),
         /// The name of a variant of a glTF file (KHR_materials_variants).
         pub variant: Option<String> = None,
