@@ -228,7 +228,7 @@ fn a_light_in_the_plane_of_its_wall_is_not_hidden_by_it() {
             for of in ["rectangle", "disk"] {
                 let falloff = if random.chance(0.5) { "falloff = \"constant\"\n" } else { "" };
                 let text = [
-                    camera_at(pose, [0.0, 1.0, 4.0], [0.0, 0.5, 0.0], 12),
+                    camera_at(pose, [0.0, 1.0, 4.0], [0.0, 0.5, 0.0], 8),
                     flat("parallelogram", pose, [0.0; 2], 0.0, 1.0, 3.0, "", 0),
                     flat(kind, pose, [0.0; 2], 2.0, -1.0, 1.2, SHADOWS, 1),
                     light(of, pose, [0.0; 2], 2.0, 0.5, falloff),
@@ -359,7 +359,7 @@ fn visible_fractions_and_many_lights_know_lights_in_walls() {
     for kind in KINDS {
         let pose = &Pose::HERE;
         let text = [
-            camera_at(pose, [0.0, 1.0, 4.0], [0.0, 0.5, 0.0], 12),
+            camera_at(pose, [0.0, 1.0, 4.0], [0.0, 0.5, 0.0], 8),
             flat("parallelogram", pose, [0.0; 2], 0.0, 1.0, 3.0, "", 0),
             flat(kind, pose, [0.0; 2], 2.0, -1.0, 3.5, SHADOWS, 1),
             lamps.clone(),

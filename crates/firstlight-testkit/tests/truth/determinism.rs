@@ -15,7 +15,7 @@ use crate::scenes::*;
 fn scenes() -> Vec<SceneDesc> {
     let mut scenes = vec![config11(50, 2, 33)];
     scenes[0].render.height = 41;
-    scenes.extend((0..6).map(|seed| {
+    scenes.extend((0..4).map(|seed| {
         let mut scene = random::scene(1_000_000 + seed);
         (scene.render.width, scene.render.height) = (45, 37);
         scene
