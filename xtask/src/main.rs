@@ -64,15 +64,15 @@ fn test_python() -> Outcome {
     }
     copy(&target.join("debug").join(library), &site.join("_firstlight.abi3.so"))?;
     let (venv, python) = (home.join("venv"), home.join("venv/bin/python"));
-    let packages = ["numpy", "pytest", "OpenEXR"];
-    let has_all = std::process::Command::new(&python).args(["-c", "import numpy, pytest, OpenEXR"]).output();
+    let packages = ["numpy", "pytest", "pytest-xdist", "OpenEXR"];
+    let has_all = std::process::Command::new(&python).args(["-c", "import numpy, pytest, xdist, OpenEXR"]).output();
     if !has_all.is_ok_and(|output| output.status.success()) {
         run_to_end(std::process::Command::new("python3").args(["-m", "venv"]).arg(&venv))?;
         run_to_end(std::process::Command::new(&python).args(["-m", "pip", "install", "--quiet"]).args(packages))?;
     }
     let mut pytest = std::process::Command::new(&python);
     let pytest = pytest.current_dir(&crates).env("PYTHONPATH", home.join("site"));
-    run_to_end(pytest.args(["-m", "pytest", "-q", "-p", "no:cacheprovider"]))
+    run_to_end(pytest.args(["-m", "pytest", "-q", "-n", "auto", "-p", "no:cacheprovider"]))
 }
 
 fn test() -> Outcome {

@@ -685,7 +685,7 @@ fn crowds_that_a_file_only_claims_are_refused() {
         json!({ "meshes": [{ "primitives": mesh }], "nodes": nodes, "accessors": accessors })
     };
     let instances = of(crowd(primitive.clone(), 1), vec![json!({ "mesh": 0, "extensions": instancing })]);
-    let places = of(crowd(primitive, 2_000), crowd(json!({ "mesh": 0, "weights": [1] }), 2_000));
+    let places = of(crowd(primitive, 10_000), crowd(json!({ "mesh": 0, "weights": [1] }), 10_000));
     for (file, at) in [(instances, "/nodes/0: "), (places, "/nodes/")] {
         let fault = fault_of(file, &PLAIN);
         assert!(fault.starts_with(at) && fault.contains("the file claims more than it holds"), "{fault}");
