@@ -16,7 +16,7 @@ macro_rules! builtin {
         &[$(Builtin {
             name: $name,
             title: $title,
-            text: include_str!(concat!("../../../../scenes/builtin/", $name, ".toml")),
+            text: include_str!(concat!("builtin/", $name, ".toml")),
         }),*]
     };
 }
