@@ -29,7 +29,7 @@ pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     answer("ok\n")
 }
 
-/// All warnings and notes, which are shown unless they are asked for as JSON.
+/// Compiles the scene and returns its warnings and its notes. Prints them to stderr, unless `--json` is set.
 fn look(args: &CheckArgs) -> Result<[Vec<Diagnostic>; 2], Failure> {
     let input = input::read(&args.scene.scene, &args.scene.reading)?;
     let compiled = input.compile(0.0, args.json)?;

@@ -12,7 +12,7 @@ use crate::error::did_you_mean;
 /// What is found for a scene that lacks it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shown {
-    /// The studio that lights it, if one was asked for.
+    /// The studio whose lights and ground the scene gets; `None`: those of the scene alone.
     pub studio: Option<StudioSettings>,
     pub framing: Framing,
     /// The file, where the scene is a model by itself.

@@ -15,7 +15,8 @@ const FOLDER: &str = "of a stranger/";
 /// A side of the picture, in pixels.
 const SIDE: u32 = 8;
 
-/// How a model is shown: mostly in the quickest studio and at rest; what only glTF files have is asked of those alone.
+/// Random studio settings for a model: in four of five cases the studio `hard`, which renders fastest. Cameras,
+/// variants and animations are set for glTF files only.
 pub fn settings(model: &ModelFiles, random: &mut Random) -> StudioSettings {
     let is_gltf = model.model.ends_with(".gltf") || model.model.ends_with(".glb");
     let says = |word: &str| {

@@ -98,7 +98,7 @@ fn gather(name: &str, time: Option<f64>, report: &ModelReport) -> Value {
     info
 }
 
-/// What is known of a mesh, or of all of them, added to what there is to say of it.
+/// Adds the numbers of a [`MeshReport`], of one mesh or the sum of all, to the JSON object `info`.
 fn facts(info: &mut Value, report: &MeshReport) {
     for (key, value) in [
         ("vertices", json!(report.vertices)),

@@ -1,8 +1,8 @@
 //! Models that are damaged at random: glTF, GLB, OBJ with MTL, PLY and STL, with their buffers and pictures.
 //!
-//! There are 2,000, or ten times `FIRSTLIGHT_SCENES` if that is more. What breaks a promise is told with its seed:
-//! `FIRSTLIGHT_SEED` is the first one, `FIRSTLIGHT_DAMAGED` a folder that gets the files of the model that failed, and
-//! `FIRSTLIGHT_MODELS` a folder with other models to damage.
+//! The test damages 2,000 models, or ten times `FIRSTLIGHT_SCENES` if that is more. A failure prints the seed of the
+//! model. `FIRSTLIGHT_SEED` sets the first seed, `FIRSTLIGHT_DAMAGED` the folder to which the test writes the files of
+//! a model that failed, and `FIRSTLIGHT_MODELS` a folder of other models to damage.
 
 use std::path::{Path, PathBuf};
 
