@@ -1,16 +1,18 @@
 //! The command line as it is written. What it means, together with a scene, is decided in each command's own file.
 
 mod values;
+mod words;
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
+use clap::{Args, Parser, Subcommand, ValueHint};
 use firstlight::{
     BufferDesc, ColorDesc, Flip, LightChange, MotionTo, SamplesDesc, SimdLevel, View, VisibilityMode, Window,
 };
 
 use values::*;
 pub use values::{Frames, NamedView, Shard, Size, color};
+pub use words::*;
 
 /// The version and, where it is known, the commit: `0.1.0 (0123456789)`.
 const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("FIRSTLIGHT_COMMIT"));
@@ -207,76 +209,6 @@ pub struct ModelArgs {
     /// The scene of a glTF model, by its number from 0 on [default: the one that the file shows]
     #[arg(long, value_name = "NUMBER")]
     pub gltf_scene: Option<u32>,
-}
-
-/// `--studio`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum StudioName {
-    /// three area lights, and a ground that takes their shadow
-    Soft,
-    /// two directional lights, of which one casts shadows: the quickest
-    Hard,
-    /// no light: every material shows its colour
-    Flat,
-    /// as soft, with every material a light warm gray
-    Clay,
-    /// the lights of the file, and nothing else
-    None,
-}
-
-/// Something that is or is not there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Switch {
-    /// it is there
-    On,
-    /// it is not
-    Off,
-}
-
-/// `--lights`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum LightSource {
-    /// the lights of the studio
-    Studio,
-    /// the lights of the file
-    File,
-}
-
-/// `--aa-mode`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum AntialiasingMode {
-    /// each surface in a pixel is lit once where its light bends little
-    Adaptive,
-    /// every camera ray is lit by itself
-    Full,
-    /// each smooth part of a surface in a pixel is lit once, as graphics processors do
-    Multisample,
-}
-
-/// An axis of a model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Axis {
-    /// as in glTF and most models for the screen
-    Y,
-    /// as in most scans and CAD programs
-    Z,
-}
-
-/// The border of light and dark on smooth meshes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Terminator {
-    /// as the round surface that the normals speak of would have it
-    Smooth,
-    /// as the facets have it
-    Hard,
-}
-
-/// Reads an angle in degrees.
-fn angle(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(angle) if (0.0..=180.0).contains(&angle) => Ok(angle),
-        _ => Err("an angle is a number of degrees, 0 to 180".into()),
-    }
 }
 
 /// `firstlight render`
@@ -658,35 +590,6 @@ pub struct CompletionsArgs {
     /// The shell
     #[arg(value_name = "SHELL")]
     pub shell: clap_complete::Shell,
-}
-
-/// Bits of a PNG channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Bits {
-    /// 256 steps
-    #[value(name = "8")]
-    Eight,
-    /// 65536 steps
-    #[value(name = "16")]
-    Sixteen,
-}
-
-/// A format by its name, where no ending says it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum NamedFormat {
-    /// 8 or 16 bits, display-encoded
-    Png,
-    /// The film itself, in 32-bit floats
-    Exr,
-    /// The film itself, as arrays for numpy
-    Npz,
-    /// One buffer, as an array for numpy
-    Npy,
-    /// The film itself, in Radiance's shared exponents
-    Hdr,
-    /// 8 bits with losses, display-encoded
-    #[value(alias = "jpg")]
-    Jpeg,
 }
 
 #[cfg(test)]

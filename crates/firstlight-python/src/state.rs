@@ -42,7 +42,8 @@ pub struct Wanted {
     pub tolerance: Option<f64>,
     pub buffers: Option<Vec<BufferDesc>>,
     pub motion_to: Option<MotionChoice>,
-    /// The time in seconds. `Some` plays the first animation of a glTF file that [`Shown`] has; `None` leaves it at rest.
+    /// The time in seconds. `Some` plays the first animation of a glTF file that [`Shown`] has; `None` leaves it at
+    /// rest.
     pub time: Option<f64>,
     /// Where a camera that is found looks from, and its margin.
     pub view: Option<View>,

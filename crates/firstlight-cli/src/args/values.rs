@@ -16,6 +16,14 @@ where
     }
 }
 
+/// Reads an angle in degrees.
+pub(super) fn angle(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(angle) if (0.0..=180.0).contains(&angle) => Ok(angle),
+        _ => Err("an angle is a number of degrees, 0 to 180".into()),
+    }
+}
+
 /// Reads how shadows are found.
 pub(super) fn visibility() -> impl TypedValueParser<Value = VisibilityMode> {
     PossibleValuesParser::new(VisibilityMode::ALL.iter().map(|mode| mode.name()))

@@ -341,6 +341,15 @@ def _from_channel(role, pixels, channel, factor):
     return Map(role, _opaque(pixels), {"channel": channel, "factor": factor})
 
 
+def _add_maps(fields, model, normal, occlusion):
+    """Adds the normal map and the occlusion texture of a material to its fields, if it has them."""
+    normal, occlusion = _taken(model, normal, "normal texture"), _taken(model, occlusion, "occlusion texture")
+    if normal is not None:
+        fields["normal_map"] = Map("normal", _opaque(normal), None)
+    if occlusion is not None:
+        fields["occlusion"] = _from_channel("occlusion", occlusion, "r", 1.0)
+
+
 def _alpha(mode, pixels, factor, cutoff=None):
     """The fields of a material that is not opaque. The texture is that of the colour."""
     factor = _limited([factor])[0]
@@ -382,12 +391,7 @@ def _pbr(model, material):
         "single_sided": not said("doubleSided"),
         **({} if mode is None else _alpha(mode, base, factor[3], cutoff)),
     }
-    normal = _taken(model, said("normalTexture"), "normal texture")
-    if normal is not None:
-        fields["normal_map"] = Map("normal", _opaque(normal), None)
-    occlusion = _taken(model, said("occlusionTexture"), "occlusion texture")
-    if occlusion is not None:
-        fields["occlusion"] = _from_channel("occlusion", occlusion, "r", 1.0)
+    _add_maps(fields, model, said("normalTexture"), said("occlusionTexture"))
     emission = [max(0.0, number) for number in _floats(said("emissiveFactor"), 3, [0.0] * 3)]
     if any(emission):
         texture, most = _taken(model, said("emissiveTexture"), "emission texture"), max(1.0, *emission)
@@ -550,12 +554,7 @@ def _filament(model, texture, vector, scalar, shader):
         alone = _taken(model, own[key], f"{key} texture")
         role, pixels, channel = ("metallic-roughness", both, channel) if alone is None else (key, alone, "r")
         fields[key] = _from_channel(role, pixels, channel, _number(scalar(key), default))
-    normal = _taken(model, texture("normal"), "normal texture")
-    if normal is not None:
-        fields["normal_map"] = Map("normal", _opaque(normal), None)
-    occlusion = _taken(model, texture("ambient_occlusion"), "occlusion texture")
-    if occlusion is not None:
-        fields["occlusion"] = _from_channel("occlusion", occlusion, "r", 1.0)
+    _add_maps(fields, model, texture("normal"), texture("ambient_occlusion"))
     reflectance = _number(scalar("reflectance"), _REFLECTANCE)
     if reflectance != _REFLECTANCE:
         fields["specular"] = _limited([4 * reflectance * reflectance])[0]
