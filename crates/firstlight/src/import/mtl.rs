@@ -1,5 +1,5 @@
-//! Wavefront MTL: what a file of materials says, statement by statement. What it means is in `model/mtl.rs`; statements of
-//! textures are in `mtl/picture.rs`.
+//! Wavefront MTL: what a file of materials says, statement by statement. What it means is in `model/mtl.rs`; statements
+//! of textures are in `mtl/picture.rs`.
 //!
 //! Keywords are read in any case, with blanks or tabs between words; `#` begins a comment at the start of a line and
 //! after numbers; `\` at the end of a line goes on with the next. What is no UTF-8 is read as Windows-1252. A statement
