@@ -27,21 +27,11 @@ macro_rules! dispatch_eight {
 }
 
 /// Runs code for sixteen rays at a time where the instruction set has room for it, and otherwise what takes them one by
-/// one. Unit tests of this library have one copy: see [`dispatch_wide`](crate::math::dispatch_wide).
+/// one.
 macro_rules! dispatch_sixteen {
     ($level:expr, $simd:ident => $op:expr, else $one_by_one:expr) => {{
         let level: fearless_simd::Level = $level;
-        #[cfg(all(target_arch = "x86_64", test))]
-        if let Some($simd) = level.as_avx2() {
-            fearless_simd::Simd::vectorize(
-                $simd,
-                #[inline(always)]
-                || $op,
-            )
-        } else {
-            $one_by_one
-        }
-        #[cfg(all(target_arch = "x86_64", not(test)))]
+        #[cfg(target_arch = "x86_64")]
         if let Some($simd) = level.as_avx512() {
             fearless_simd::Simd::vectorize(
                 $simd,

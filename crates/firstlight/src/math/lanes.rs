@@ -6,18 +6,11 @@ use super::{LANES, Vec3};
 
 /// Runs code for sixteen numbers at a time with the instruction set that suits it: AVX-512, AVX2, NEON, or what every
 /// processor has. Three copies, not five: the code below takes the compiler seconds; and of plain numbers, sixteen to a
-/// step, minutes. One in the unit tests of this library: whole pictures are compared at every level, by the tests of
-/// scenes.
+/// step, minutes.
 macro_rules! dispatch_wide {
     ($level:expr, $simd:ident => $op:expr) => {{
         let level: fearless_simd::Level = $level;
-        #[cfg(all(target_arch = "x86_64", test))]
-        {
-            _ = level;
-            let $simd = $crate::accel::baseline();
-            $op
-        }
-        #[cfg(all(target_arch = "x86_64", not(test)))]
+        #[cfg(target_arch = "x86_64")]
         if let Some($simd) = level.as_avx512() {
             $op
         } else if let Some($simd) = level.as_avx2() {
