@@ -80,8 +80,8 @@ fn info_says_what_a_model_holds() {
         "variant    light\nvariant    dark\n",
         "camera     entry\n",
         "light      kind point, name lamp\n",
-        "odd        the mesh not closed: edges of one triangle only: 3\n",
-        "odd        the mesh without normals: it is shown flat\n",
+        "odd        boundary edges: 3 in the mesh; the surface is not closed\n",
+        "odd        no normals: in the mesh; shaded flat\n",
     ] {
         assert!(text.contains(part), "{part:?} is not in\n{text}");
     }
@@ -116,16 +116,16 @@ fn what_is_odd_about_a_gltf_file_is_told() {
         "picture    gone.png, no such file, for base color\n",
         "picture    spare.png, no such file, not used\n",
         "extension  KHR_lights_punctual, read\nextension  KHR_materials_sheen, ignored\n",
-        "odd        the mesh open and single-sided: the camera looks through the back of it\n",
-        "odd        the mesh without the texture coordinates that the textures of \"chair.gltf/oak\" ask for\n",
-        "odd        the mesh mirrored: 1 times; fronts stay outside\n",
+        "odd        open single-sided surface: in the mesh; camera rays pass through its back\n",
+        "odd        no texture coordinates: in the mesh; the textures of \"chair.gltf/oak\" need them\n",
+        "odd        mirrored placements: 1, of the mesh; front faces stay outside\n",
         "odd        nodes with a negative scale: 1\n",
-        "odd        its longest side would be 200 m: its numbers may be millimetres or centimetres\n",
+        "odd        the longest side is 200 m; the unit of the file may be millimetres or centimetres\n",
         "odd        materials without a name: \"material 3\"\n",
-        "odd        materials that nothing has: \"elm\", \"material 3\"\n",
-        "odd        textures that are missing or damaged: \"gone.png\"\n",
-        "odd        pictures that no material uses: \"spare.png\"\n",
-        "odd        extensions that are ignored: \"KHR_materials_sheen\"\n",
+        "odd        unused materials: \"elm\", \"material 3\"\n",
+        "odd        missing or damaged textures: \"gone.png\"\n",
+        "odd        unused pictures: \"spare.png\"\n",
+        "odd        ignored extensions: \"KHR_materials_sheen\"\n",
     ] {
         assert!(text.contains(part), "{part:?} is not in\n{text}");
     }
@@ -157,20 +157,20 @@ fn what_is_odd_about_other_models_is_told() {
         "normals    given, 3 not of length 1\n",
         "material   oak\nmaterial   elm, not used\n",
         "picture    oak.png, no such file, for diffuse\npicture    elm.png, no such file, not used\n",
-        "odd        the mesh with triangles without area, which are left out: 1\n",
-        "odd        the mesh without the texture coordinates that the textures of \"a.obj/oak\" ask for\n",
-        "odd        pictures that no material uses: \"elm.png\"\n",
+        "odd        triangles without area: 1 in the mesh; removed\n",
+        "odd        no texture coordinates: in the mesh; the textures of \"a.obj/oak\" need them\n",
+        "odd        unused pictures: \"elm.png\"\n",
     ] {
         assert!(text.contains(part), "{part:?} is not in\n{text}");
     }
     // What is made right where it is rendered is a note
-    let note = "note: a.obj: the mesh with normals whose length is not 1, which are made so: ";
-    folder.run("check a.obj").done().says(&[note, "triangles without area, which are left out: 1\n"]);
+    let note = "note: a.obj: normals whose length is not 1: ";
+    folder.run("check a.obj").done().says(&[note, "triangles without area: 1 in the mesh; removed\n"]);
     // A sound one
     let sound = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
     folder.put("sound.obj", sound);
     let text = folder.run("info sound.obj").done().text();
-    assert!(text.contains("surface    closed\n") && text.contains("odd        the mesh without normals"), "{text}");
+    assert!(text.contains("surface    closed\n") && text.contains("odd        no normals: in the mesh"), "{text}");
     assert_eq!(text.matches("\nodd ").count(), 1, "{text}");
 }
 

@@ -225,7 +225,8 @@ impl ModelReport {
         odd
     }
 
-    /// How many of the meshes are so, in words, with how many of a thing they have; `None` if none is.
+    /// The meshes that have any of a thing, such as `2 of 3 meshes ("leg" and others)`, and their number of it; `None`
+    /// if no mesh has any.
     fn which(&self, count: impl Fn(&ModelMesh) -> u64) -> Option<(String, u64)> {
         let found: Vec<(&ModelMesh, u64)> =
             self.meshes.iter().map(|mesh| (mesh, count(mesh))).filter(|(_, count)| *count > 0).collect();
@@ -233,8 +234,10 @@ impl ModelReport {
         match (&found[..], self.meshes.len()) {
             ([], _) => None,
             (_, 1) => Some(("the mesh".to_owned(), all)),
-            ([(mesh, _)], of) => Some((format!("1 of {of} meshes, {:?},", mesh.name), all)),
-            ([(mesh, _), ..], of) => Some((format!("{} of {of} meshes, {:?} for one,", found.len(), mesh.name), all)),
+            ([(mesh, _)], of) => Some((format!("1 of {of} meshes ({:?})", mesh.name), all)),
+            ([(mesh, _), ..], of) => {
+                Some((format!("{} of {of} meshes ({:?} and others)", found.len(), mesh.name), all))
+            }
         }
     }
 
@@ -246,38 +249,37 @@ impl ModelReport {
                 if points { "points, and no triangles" } else { "nothing is shown: there are no triangles" }.into(),
             );
         }
-        if let Some((meshes, edges)) = self.which(|mesh| mesh.report.boundary_edges) {
-            odd.push(format!("{meshes} not closed: edges of one triangle only: {edges}"));
-        }
         let open = |mesh: &ModelMesh| u64::from(mesh.single_sided && mesh.report.boundary_edges > 0);
         if let Some((meshes, _)) = self.which(open) {
-            odd.push(format!("{meshes} open and single-sided: the camera looks through the back of it"));
+            odd.push(format!("open single-sided surface: in {meshes}; camera rays pass through its back"));
         }
-        odd.extend(self.counted(&[
-            (|mesh| mesh.non_manifold_edges, "edges of more than two triangles"),
-            (|mesh| mesh.turned_edges, "edges whose two triangles turn opposite ways"),
-            (|mesh| mesh.duplicate_triangles, "triangles that are there twice"),
-            (|mesh| mesh.non_finite_vertices, "vertices with a number that is not finite"),
-        ]));
+        let defects = self.counted(&[
+            (|mesh| mesh.boundary_edges, "boundary edges", "; the surface is not closed"),
+            (|mesh| mesh.non_manifold_edges, "non-manifold edges", "; more than two triangles share each"),
+            (|mesh| mesh.turned_edges, "edges between triangles of opposite winding", ""),
+            (|mesh| mesh.duplicate_triangles, "duplicate triangles", ""),
+            (|mesh| mesh.non_finite_vertices, "vertices that are not finite", ""),
+        ]);
+        odd.splice(..0, defects);
         odd
     }
 
-    /// What of the numbers of the file is left out or made right where it is rendered, each in one sentence for a user;
-    /// it is odd as well.
+    /// The numbers of the file that the reader removes or replaces before it is rendered: a line for each kind.
+    /// [`oddities`](Self::oddities) has them too.
     pub fn repairs(&self) -> Vec<String> {
         self.counted(&[
-            (|mesh| mesh.degenerate_triangles, "triangles without area, which are left out"),
-            (|mesh| mesh.non_finite_triangles, "triangles with a number that is not finite, which are left out"),
-            (|mesh| mesh.bad_normals, "normals of no direction, in place of which the facet's are taken"),
-            (|mesh| mesh.non_unit_normals, "normals whose length is not 1, which are made so"),
+            (|mesh| mesh.degenerate_triangles, "triangles without area", "; removed"),
+            (|mesh| mesh.non_finite_triangles, "triangles that are not finite", "; removed"),
+            (|mesh| mesh.bad_normals, "normals without direction", "; replaced by those of the facets"),
+            (|mesh| mesh.non_unit_normals, "normals whose length is not 1", "; normalized"),
         ])
     }
 
-    /// Which meshes have how many of these things.
-    fn counted(&self, things: &[(CountOf, &str)]) -> Vec<String> {
-        let said = |(count, what): &(CountOf, &str)| {
+    /// A line for each kind of thing that any mesh has: its name, its number, the meshes, and what follows from it.
+    fn counted(&self, things: &[(CountOf, &str, &str)]) -> Vec<String> {
+        let said = |(count, what, consequence): &(CountOf, &str, &str)| {
             let (meshes, count) = self.which(|mesh| count(&mesh.report))?;
-            Some(format!("{meshes} with {what}: {count}"))
+            Some(format!("{what}: {count} in {meshes}{consequence}"))
         };
         things.iter().filter_map(said).collect()
     }
@@ -287,13 +289,13 @@ impl ModelReport {
         let is_flat = |mesh: &ModelMesh| u64::from(mesh.report.triangles > 0 && !mesh.report.has_normals);
         if let Some((meshes, _)) = self.which(is_flat) {
             let gltf = matches!(self.format, "glTF" | "GLB");
-            let shown = if gltf { "it is shown flat" } else { "they are made of the faces" };
-            odd.push(format!("{meshes} without normals: {shown}"));
+            let shown = if gltf { "shaded flat" } else { "computed from the faces" };
+            odd.push(format!("no normals: in {meshes}; {shown}"));
         }
         if let Some((meshes, _)) = self.which(|mesh| mesh.lacks_uv.len() as u64) {
             let first = self.meshes.iter().find_map(|mesh| mesh.lacks_uv.first());
             let material = first.map_or("", String::as_str);
-            odd.push(format!("{meshes} without the texture coordinates that the textures of {material:?} ask for"));
+            odd.push(format!("no texture coordinates: in {meshes}; the textures of {material:?} need them"));
         }
         odd
     }
@@ -301,7 +303,7 @@ impl ModelReport {
     fn odd_places(&self) -> Vec<String> {
         let mut odd = Vec::new();
         if let Some((meshes, count)) = self.which(|mesh| mesh.mirrored) {
-            odd.push(format!("{meshes} mirrored: {count} times; fronts stay outside"));
+            odd.push(format!("mirrored placements: {count}, of {meshes}; front faces stay outside"));
         }
         if self.counts.negative_scales > 0 {
             odd.push(format!("nodes with a negative scale: {}", self.counts.negative_scales));
@@ -310,11 +312,9 @@ impl ModelReport {
         let [least, most] = USUAL_SIZES;
         if size > most {
             let size = size.round();
-            odd.push(format!("its longest side would be {size} m: its numbers may be millimetres or centimetres"));
+            odd.push(format!("the longest side is {size} m; the unit of the file may be millimetres or centimetres"));
         } else if size > 0.0 && size < least {
-            odd.push(format!(
-                "its longest side would be {size:.2e} m: its numbers may be of a larger unit than metres"
-            ));
+            odd.push(format!("the longest side is {size:.2e} m; the unit of the file may be larger than metres"));
         }
         odd
     }
@@ -332,17 +332,14 @@ impl ModelReport {
                 "materials without a name",
                 self.materials.iter().filter(|material| !material.named).map(|m| &*m.name).collect(),
             ),
+            ("unused materials", self.materials.iter().filter(|material| !material.used).map(|m| &*m.name).collect()),
+            ("missing or damaged textures", self.faulty_pictures().map(|picture| &*picture.file).collect()),
             (
-                "materials that nothing has",
-                self.materials.iter().filter(|material| !material.used).map(|m| &*m.name).collect(),
-            ),
-            ("textures that are missing or damaged", self.faulty_pictures().map(|picture| &*picture.file).collect()),
-            (
-                "pictures that no material uses",
+                "unused pictures",
                 self.pictures.iter().filter(|picture| picture.uses.is_empty()).map(|p| &*p.file).collect(),
             ),
             (
-                "extensions that are ignored",
+                "ignored extensions",
                 self.extensions.iter().filter(|extension| !extension.read).map(|e| &*e.name).collect(),
             ),
         ];
@@ -383,17 +380,17 @@ mod tests {
         assert_eq!(
             report.oddities(),
             [
-                "1 of 2 meshes, \"b\", not closed: edges of one triangle only: 3",
-                "1 of 2 meshes, \"b\", open and single-sided: the camera looks through the back of it",
-                "1 of 2 meshes, \"b\", with triangles without area, which are left out: 2",
-                "1 of 2 meshes, \"b\", without normals: they are made of the faces",
-                "1 of 2 meshes, \"b\", mirrored: 1 times; fronts stay outside",
-                "its longest side would be 2000 m: its numbers may be millimetres or centimetres",
+                "boundary edges: 3 in 1 of 2 meshes (\"b\"); the surface is not closed",
+                "open single-sided surface: in 1 of 2 meshes (\"b\"); camera rays pass through its back",
+                "triangles without area: 2 in 1 of 2 meshes (\"b\"); removed",
+                "no normals: in 1 of 2 meshes (\"b\"); computed from the faces",
+                "mirrored placements: 1, of 1 of 2 meshes (\"b\"); front faces stay outside",
+                "the longest side is 2000 m; the unit of the file may be millimetres or centimetres",
                 "materials without a name: \"material 0\"",
-                "materials that nothing has: \"material 0\"",
-                "textures that are missing or damaged: \"a.png\"",
-                "pictures that no material uses: \"b.png\"",
-                "extensions that are ignored: \"X_y\"",
+                "unused materials: \"material 0\"",
+                "missing or damaged textures: \"a.png\"",
+                "unused pictures: \"b.png\"",
+                "ignored extensions: \"X_y\"",
             ]
         );
         assert_eq!(ModelReport::default().oddities(), ["nothing is shown: there are no triangles"]);
