@@ -55,7 +55,9 @@ impl MeshData {
                 tell(field, format!("{length} of them for {vertices} positions"), hint);
             }
         };
-        for (field, length) in [("normals", self.normals.len()), ("colors", self.colors.len())] {
+        for (field, length) in
+            [("normals", self.normals.len()), ("tangents", self.tangents.len()), ("colors", self.colors.len())]
+        {
             if length != 0 {
                 tell_length(field.into(), length, "give one for each vertex, or none");
             }
@@ -135,6 +137,9 @@ impl MeshData {
         list(&mut self.triangles.iter().flatten().map(|c| c.to_le_bytes()));
         list(&mut self.face_materials.iter().map(|c| c.to_le_bytes()));
         list(&mut self.smoothing.iter().map(|c| c.to_le_bytes()));
+        if !self.tangents.is_empty() {
+            list(&mut self.tangents.iter().flatten().map(|c| c.to_le_bytes()));
+        }
         for name in &self.materials {
             hasher.update(&(name.len() as u64).to_le_bytes()).update(name.as_bytes());
         }

@@ -69,6 +69,9 @@ pub struct MeshData {
     pub origin: [f64; 3],
     /// Per vertex, as the file has them: not always of length 1; `[0, 0, 0]` where the file gives none.
     pub normals: Vec<[f32; 3]>,
+    /// Per vertex: the direction in which u grows, from which normal maps count, and 1 or -1: that times normal x
+    /// tangent is the direction in which v grows. `[0, 0, 0, 0]` where the file gives none. Read from glTF.
+    pub tangents: Vec<[f32; 4]>,
     /// Sets of texture coordinates, each per vertex; no set if the file has none. v as the file has it.
     pub uvs: Vec<Vec<[f32; 2]>>,
     /// Per vertex: red, green, blue, **linear** Rec. 709, and alpha. Colours in files are taken as sRGB and decoded,
@@ -212,7 +215,7 @@ impl MeshData {
     /// What is wrong with the lengths of lists or an index, if anything is: the promise of the type.
     pub(crate) fn fault(&self) -> Option<String> {
         let (vertices, triangles) = (self.positions.len(), self.triangles.len());
-        let per_vertex = [self.normals.len(), self.colors.len(), self.radii.len()];
+        let per_vertex = [self.normals.len(), self.tangents.len(), self.colors.len(), self.radii.len()];
         if per_vertex.into_iter().any(|n| n != 0 && n != vertices) || self.uvs.iter().any(|set| set.len() != vertices) {
             return Some(format!("a list per vertex has not {vertices}"));
         }

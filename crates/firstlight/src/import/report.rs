@@ -120,6 +120,7 @@ impl MeshData {
         }
         of(&self.positions)
             + of(&self.normals)
+            + of(&self.tangents)
             + self.uvs.iter().map(|set| of(set)).sum::<u64>()
             + of(&self.colors)
             + of(&self.radii)

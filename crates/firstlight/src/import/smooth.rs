@@ -38,6 +38,8 @@ impl MeshData {
     /// The mesh is left as it is, but without normals, if it would need more than 2^32 - 2 vertices.
     pub fn smooth(&mut self, crease_deg: f64) {
         self.normals = Vec::new();
+        // They belong to the normals that are replaced
+        self.tangents = Vec::new();
         let corners = 3 * self.triangles.len();
         if corners as u64 > super::MAX_COUNT {
             return;

@@ -19,6 +19,7 @@ impl MeshData {
         self.drop_unused_vertices();
         self.make_numbers_finite();
         self.make_normals_unit();
+        self.make_tangents_unit();
     }
 
     /// Texture coordinates and colours that are no numbers are 0 and white; all are held to what lists may have.
@@ -53,6 +54,7 @@ impl MeshData {
         });
         keep(&mut self.positions, &used);
         keep(&mut self.normals, &used);
+        keep(&mut self.tangents, &used);
         keep(&mut self.colors, &used);
         keep(&mut self.radii, &used);
         for set in &mut self.uvs {
@@ -91,9 +93,19 @@ impl MeshData {
         self.copy_vertices(&sources);
     }
 
+    /// Gives all tangents the length 1 and a sign; what has no direction is 0.
+    fn make_tangents_unit(&mut self) {
+        parallel::for_each_mut(&mut self.tangents, CHUNK, |_, tangent| {
+            let [x, y, z] = unit([tangent[0], tangent[1], tangent[2]]);
+            let sign = if [x, y, z] == [0.0; 3] { 0.0 } else { 1f32.copysign(tangent[3]) };
+            *tangent = [x, y, z, sign];
+        });
+    }
+
     /// Adds copies of vertices after all others, in all lists but that of the normals.
     pub(super) fn copy_vertices(&mut self, sources: &[u32]) {
         copy(&mut self.positions, sources);
+        copy(&mut self.tangents, sources);
         copy(&mut self.colors, sources);
         copy(&mut self.radii, sources);
         for set in &mut self.uvs {

@@ -177,21 +177,31 @@ impl Gltf {
             Some(normal) => as_many(&normal).and_then(|()| self.vectors::<3>(&normal))?,
             None => Vec::new(),
         };
+        // Without normals they say nothing
+        let mut tangents = match attributes.get("TANGENT").filter(|_| !normals.is_empty()) {
+            Some(tangent) => as_many(&tangent).and_then(|()| self.vectors::<4>(&tangent))?,
+            None => Vec::new(),
+        };
         // Morph targets
         for (target, weight) in primitive.list("targets")?.iter().zip(posing.weights) {
             if *weight == 0.0 {
                 continue;
             }
-            for (key, vectors) in [("POSITION", &mut positions), ("NORMAL", &mut normals)] {
+            let positions = positions.iter_mut().map(|vector| &mut vector[..]).collect();
+            let normals = normals.iter_mut().map(|vector| &mut vector[..]).collect();
+            let tangents = tangents.iter_mut().map(|vector| &mut vector[..3]).collect();
+            let lists: [(_, Vec<&mut [f32]>); 3] =
+                [("POSITION", positions), ("NORMAL", normals), ("TANGENT", tangents)];
+            for (key, vectors) in lists {
                 let Some(at) = target.get(key).filter(|_| !vectors.is_empty()) else { continue };
                 as_many(&at)?;
-                for (vector, moved) in vectors.iter_mut().zip(self.vectors::<3>(&at)?) {
-                    *vector = [0, 1, 2].map(|i| vector[i] + weight * moved[i]);
+                for (vector, moved) in vectors.into_iter().zip(self.vectors::<3>(&at)?) {
+                    vector.iter_mut().zip(moved).for_each(|(number, moved)| *number += weight * moved);
                 }
             }
         }
         if let Some(bones) = posing.bones {
-            self.pose(&attributes, bones, &mut positions, &mut normals)?;
+            self.pose(&attributes, bones, &mut positions, &mut normals, &mut tangents)?;
         }
         // Triangles, without those of vertices that there are not
         let first = data.positions.len() as u32;
@@ -241,6 +251,11 @@ impl Gltf {
         let vertices = data.positions.len();
         data.normals.extend(normals);
         data.normals.resize(vertices, [0.0; 3]);
+        if !tangents.is_empty() || !data.tangents.is_empty() {
+            data.tangents.resize(first as usize, [0.0; 4]);
+            data.tangents.extend(tangents);
+            data.tangents.resize(vertices, [0.0; 4]);
+        }
         data.uvs.iter_mut().for_each(|set| set.resize(vertices, [0.0; 2]));
         if !colors.is_empty() || !data.colors.is_empty() {
             data.colors.resize(first as usize, [1.0; 4]);
@@ -257,6 +272,7 @@ impl Gltf {
         bones: &[DAffine3],
         positions: &mut [[f32; 3]],
         normals: &mut [[f32; 3]],
+        tangents: &mut [[f32; 4]],
     ) -> Result<(), GltfFault> {
         let mut sums = vec![(DAffine3::ZERO, 0.0f64); positions.len()];
         for set in 0.. {
@@ -293,6 +309,11 @@ impl Gltf {
                 let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
                 let side = if moved.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
                 *normal = (cofactors * n * side).normalize_or_zero().as_vec3().to_array();
+                if let Some([x, y, z, sign]) = tangents.get_mut(i) {
+                    let t = moved.transform_vector3(DVec3::new(f64::from(*x), f64::from(*y), f64::from(*z)));
+                    [*x, *y, *z] = t.normalize_or_zero().as_vec3().to_array();
+                    *sign *= side as f32;
+                }
             }
         }
         Ok(())

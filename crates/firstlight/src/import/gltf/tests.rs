@@ -400,3 +400,35 @@ fn what_is_read_for_each_pose_is_counted() {
     strip["accessors"][1]["count"] = 40.into();
     assert_eq!(mesh(&strip), Ok(38));
 }
+
+#[test]
+fn tangents_are_morphed_and_turned_with_the_bones() {
+    let mut buffer = Buffer::default();
+    let position = buffer.floats("VEC3", 3, &CORNERS);
+    let normal = buffer.floats("VEC3", 3, &[0.0, 0.0, 1.0].repeat(3));
+    let tangent = buffer.floats("VEC4", 4, &[1.0, 0.0, 0.0, -1.0].repeat(3));
+    let moved = buffer.floats("VEC3", 3, &[0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let joints = buffer.shorts("VEC4", 4, &[0; 12]);
+    let weights = buffer.floats("VEC4", 4, &[1.0, 0.0, 0.0, 0.0].repeat(3));
+    let mut attributes = json!({ "POSITION": position, "NORMAL": normal, "TANGENT": tangent });
+    let of = |attributes: &Value| {
+        let mut skinned = attributes.clone();
+        (skinned["JOINTS_0"], skinned["WEIGHTS_0"]) = (joints.into(), weights.into());
+        let gltf = buffer.file(json!({
+            "meshes": [
+                { "primitives": [{ "attributes": attributes, "targets": [{ "TANGENT": moved }] }], "weights": [0.5] },
+                { "primitives": [{ "attributes": skinned }] },
+            ],
+            "skins": [{ "joints": [1] }],
+            "nodes": [{ "mesh": 1, "skin": 0 }, { "scale": [-3, 1, 1] }],
+        }));
+        let mesh = |address| gltf.mesh(&address).unwrap_or_else(|fault| panic!("{fault:?}"));
+        [mesh(MeshAddress::Mesh(0)), mesh(MeshAddress::Node(0, None))].map(|mesh| mesh.tangents)
+    };
+    let [morphed, mirrored] = of(&attributes);
+    assert_eq!(morphed, [[1.0, 1.0, 0.0, -1.0], [1.0, 0.0, 0.0, -1.0], [1.0, 0.0, 0.0, -1.0]]);
+    assert_eq!(mirrored, [[-1.0, 0.0, 0.0, 1.0]; 3]);
+    // They go with normals
+    attributes.as_object_mut().expect("is an object").remove("NORMAL");
+    assert_eq!(of(&attributes), [[[0.0; 4]; 0], [[0.0; 4]; 0]]);
+}

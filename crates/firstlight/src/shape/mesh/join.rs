@@ -182,13 +182,13 @@ impl Lists {
         let mut data = Arc::unwrap_or_clone(data);
         move_mesh(&mut data, transform, origin);
         let (vertices, first) = (self.positions.len(), self.triangles.len());
-        let MeshData { positions, mut triangles, normals, mut uvs, colors, face_materials, .. } = data;
+        let MeshData { positions, mut triangles, normals, tangents: given, mut uvs, colors, face_materials, .. } = data;
         let added = positions.len();
         let mut take = |set: usize| uvs.get_mut(set).map_or(Vec::new(), std::mem::take);
         let own_uvs = take(uv_set);
         self.classes.push(class);
         let tangents_by = |uvs: &[[f32; 2]], are_needed: bool| match are_needed && !uvs.is_empty() {
-            true => tangents::tangents(&positions, &triangles, &normals, uvs),
+            true => tangents::of_corners(&given, &positions, &triangles, &normals, uvs),
             false => Vec::new(),
         };
         let tangents = tangents_by(&own_uvs, has_tangents);
@@ -261,7 +261,7 @@ fn bounds(data: &MeshData, transform: Option<DAffine3>) -> Option<[DVec3; 2]> {
     bounds
 }
 
-/// Moves positions and normals, in f64; positions then count from `origin`.
+/// Moves positions, normals and tangents, in f64; positions then count from `origin`.
 fn move_mesh(data: &mut MeshData, transform: Option<DAffine3>, origin: DVec3) {
     let own = DVec3::from(data.origin);
     let is_shifted = own != DVec3::ZERO || origin != DVec3::ZERO;
@@ -280,8 +280,15 @@ fn move_mesh(data: &mut MeshData, transform: Option<DAffine3>, origin: DVec3) {
         let moved = placement.normal(Vec3::from(*n).as_dvec3()).normalize_or_zero();
         *n = moved.as_vec3().into();
     }
+    let is_mirror = transform.matrix3.determinant() < 0.0;
+    for [x, y, z, sign] in &mut data.tangents {
+        let moved = transform.transform_vector3(Vec3::new(*x, *y, *z).as_dvec3()).normalize_or_zero();
+        [*x, *y, *z] = moved.as_vec3().into();
+        // Normal x tangent does not follow a mirror
+        *sign = if is_mirror { -*sign } else { *sign };
+    }
     // A mirror turns the corners of every face around
-    if transform.matrix3.determinant() < 0.0 {
+    if is_mirror {
         data.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     }
 }

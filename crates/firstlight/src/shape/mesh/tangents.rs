@@ -1,7 +1,9 @@
-//! Tangents of meshes for normal maps.
+//! Tangents of meshes for normal maps: those that a file gives, and MikkTSpace where it gives none.
 //!
 //! MikkTSpace (Mikkelsen, "Simulation of wrinkled surfaces revisited", master's thesis, University of Copenhagen,
 //! 2008), which tools that make normal maps count from, on triangles that share no vertices.
+
+use std::iter;
 
 use bevy_mikktspace::{Geometry, Ops, TangentSpace, generate_tangents};
 
@@ -73,9 +75,30 @@ impl Geometry<SameBits> for Unwelded<'_> {
     }
 }
 
-/// The tangents of triangles with texture coordinates; 0 where uv has no direction. Without normals each triangle has
-/// its own.
-pub(super) fn tangents(
+/// The tangents of triangles with texture coordinates: those that the mesh gives for all three corners, else those of
+/// MikkTSpace.
+pub(super) fn of_corners(
+    given: &[[f32; 4]],
+    positions: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+    normals: &[[f32; 3]],
+    uvs: &[[f32; 2]],
+) -> Vec<CornerTangents> {
+    let given_of = |triangle: &[u32; 3]| {
+        let of = triangle.map(|v| given.get(v as usize).copied().unwrap_or_default());
+        of.iter().all(|tangent| tangent[3] != 0.0).then_some(of)
+    };
+    let given: Vec<Option<CornerTangents>> = triangles.iter().map(given_of).collect();
+    if given.iter().all(Option::is_some) {
+        return given.into_iter().flatten().collect();
+    }
+    let found = mikktspace(positions, triangles, normals, uvs);
+    let found = found.into_iter().chain(iter::repeat(CornerTangents::default()));
+    given.into_iter().zip(found).map(|(given, found)| given.unwrap_or(found)).collect()
+}
+
+/// The tangents of MikkTSpace; 0 where uv has no direction. Without normals each triangle has its own.
+fn mikktspace(
     positions: &[[f32; 3]],
     triangles: &[[u32; 3]],
     normals: &[[f32; 3]],
@@ -162,5 +185,22 @@ impl Mesh {
         let [t, b, n] = [t, b, n].map(|v| to_world(v) * scale);
         let is_right = n.is_finite() && t.is_finite() && t != DVec3::ZERO && n.dot(front) > 0.0;
         is_right.then_some(NormalFrame { t, b, n, dp })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn given_tangents_replace_found_ones_where_all_corners_have_one() {
+        let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
+        let (triangles, normals) = ([[0, 1, 2], [2, 1, 3]], [[0.0, 0.0, 1.0]; 4]);
+        let uvs = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+        let of = |given: &[[f32; 4]]| of_corners(given, &positions, &triangles, &normals, &uvs);
+        let (found, other) = ([1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, -1.0]);
+        assert_eq!(of(&[]), [[found; 3]; 2]);
+        assert_eq!(of(&[other; 4]), [[other; 3]; 2]);
+        assert_eq!(of(&[other, other, other, [0.0; 4]]), [[other; 3], [found; 3]]);
     }
 }
