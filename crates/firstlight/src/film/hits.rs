@@ -73,9 +73,9 @@ impl PixelHits {
         self.aim(scene, rays.x, rays.y);
         let [left, top] = [rays.x - self.first[0] * self.n, rays.y - self.first[1] * self.n];
         let (w, h) = (rays.width, rays.height);
-        let bundle = geometry.world_as_bundle();
+        let bundle = geometry.is_world_seen();
         // Whether packets find all hits with placed things too
-        let upper_bundle = (bundle || !geometry.has_world()) && {
+        let upper_bundle = {
             let corners = [[0, 0], [w - 1, 0], [w - 1, h - 1], [0, h - 1]].map(|[column, row]| {
                 let place = place(column, row);
                 [self.rays.o(place), self.rays.d(place)].map(Vec3::as_dvec3)
@@ -86,18 +86,18 @@ impl PixelHits {
             let (row, column) = (place / 32 * 4 + place % 16 / 4, place / 16 % 2 * 4 + place % 4);
             (top as usize + row) * self.across as usize + left as usize + column
         };
+        let rays = &self.rays;
+        let ray = |place: usize| Ray { o: rays.o(place), d: rays.d(place) };
         let mut active = 0u64;
         for row in 0..h {
             for column in 0..w {
                 let place = place(column, row);
-                let ray = Ray { o: self.rays.o(place), d: self.rays.d(place) };
+                let ray = ray(place);
                 let mut nearest = scene.meet_listed(&ray);
                 if upper_bundle {
                     geometry.meet_unbounded(self.level, &ray, &mut nearest);
-                } else if bundle {
+                } else {
                     geometry.meet_upper(self.level, &ray, &mut nearest);
-                } else if geometry.has_trees() {
-                    geometry.meet_trees(self.level, &ray, &mut nearest);
                 }
                 active |= 1 << place;
                 self.hits[at(place)] = nearest;
@@ -107,7 +107,10 @@ impl PixelHits {
             ask_from_here(&mut self.found, active, |place| self.hits[at(place)].limit());
             let met = geometry.meet_world(self.level, &self.rays, active, &mut self.found);
             for place in bits(met) {
-                geometry.offer_world(&self.found, place, &mut self.hits[at(place)]);
+                let nearest = &mut self.hits[at(place)];
+                if !geometry.offer_world(&ray(place), &self.found, place, nearest) {
+                    geometry.meet_trees(self.level, &ray(place), nearest);
+                }
             }
         }
         if upper_bundle && !self.meshes.is_empty() {
@@ -117,7 +120,10 @@ impl PixelHits {
                 met |= geometry.meet_placed_tile(self.level, *mesh, &self.rays, active, &mut self.found);
             }
             for place in bits(met) {
-                geometry.offer_placed(&self.meshes, &self.found, place, &mut self.hits[at(place)]);
+                let nearest = &mut self.hits[at(place)];
+                if !geometry.offer_placed(&self.meshes, &ray(place), &self.found, place, nearest) {
+                    geometry.meet_trees(self.level, &ray(place), nearest);
+                }
             }
         }
     }

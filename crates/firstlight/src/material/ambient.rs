@@ -211,6 +211,8 @@ impl GgxLobe {
     /// The same by a quadrature of so many polar angles, and as many azimuths, of the half vector.
     fn integrate_white(&self, cos_o: f64, points: usize) -> [f32; 2] {
         let (alpha2, sin_o) = (f64::from(self.alpha) * f64::from(self.alpha), (1.0 - cos_o * cos_o).sqrt());
+        let azimuth = |spoke: usize| (spoke as f64 + 0.5) / points as f64 * std::f64::consts::PI;
+        let cosines: Vec<f64> = (0..points).map(|spoke| pxfm::f_cos(azimuth(spoke))).collect();
         let mut sums = [0.0f64; 2];
         for ring in 0..points {
             // The part of the distribution closer to the normal is 1 - v^2: so rings are denser towards the horizon
@@ -220,9 +222,8 @@ impl GgxLobe {
             let t = cos_h2 * (alpha2 - 1.0) + 1.0;
             // pi times the density of half vectors
             let density = alpha2 * cos_h / (t * t);
-            for spoke in 0..points {
-                let phi = (spoke as f64 + 0.5) / points as f64 * std::f64::consts::PI;
-                let cos_oh = sin_o * sin_h * pxfm::f_cos(phi) + cos_o * cos_h;
+            for cos_phi in &cosines {
+                let cos_oh = sin_o * sin_h * cos_phi + cos_o * cos_h;
                 let cos_i = 2.0 * cos_oh * cos_h - cos_o;
                 if cos_i > 0.0 && cos_oh > 0.0 {
                     let cos_io = 2.0 * cos_oh * cos_oh - 1.0;

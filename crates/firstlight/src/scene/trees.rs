@@ -131,7 +131,7 @@ impl Geometry {
     }
 
     /// Finds the meshes that are placed where camera rays inside of `planes` may meet them, if all that is placed there
-    /// is a few meshes that let no ray pass: then each can be asked for many rays at once, see
+    /// is a few meshes: then each can be asked for many rays at once, see
     /// [`meet_placed_tile`](Self::meet_placed_tile). Planes are not among them. A tile finds the mesh of a hit by its
     /// surface: where two of the meshes have the same surface, the result is `false`.
     pub fn few_meshes(&self, level: Level, planes: &Planes, found: &mut Vec<u32>) -> bool {
@@ -142,11 +142,14 @@ impl Geometry {
         let take = |item: u32| {
             let UpperItem::Placed(index) = self.items[item as usize] else { return false };
             let thing = &self.placed[index as usize];
-            let is_mesh = thing.camera == Opacity::Opaque && matches!(thing.target, PlacedTarget::Mesh(_));
+            if thing.camera == Opacity::Clear {
+                return true;
+            }
+            let is_mesh = matches!(thing.target, PlacedTarget::Mesh(_));
             if is_mesh {
                 found.push(index);
             }
-            (is_mesh && found.len() <= FEW_MESHES) || thing.camera == Opacity::Clear
+            is_mesh && found.len() <= FEW_MESHES
         };
         let are_few = dispatch_eight!(level, simd => {
             self.upper.gather(simd, |center, half| planes.within(center, half).test(), take)
@@ -170,6 +173,9 @@ impl Geometry {
             .all(|world| world.camera == Opacity::Opaque && facets_within(level, &world.mesh, 0, planes, found))
             && placed.into_iter().all(|index| {
                 let thing = &self.placed[index as usize];
+                if thing.camera != Opacity::Opaque {
+                    return false;
+                }
                 let PlacedTarget::Mesh(mesh) = thing.target else { unreachable!("only meshes are asked so") };
                 let Placement { world_from_object, object_from_world } = &thing.placement;
                 let planes = planes.placed(world_from_object, object_from_world);
@@ -235,18 +241,32 @@ impl Geometry {
         self.meshes[mesh as usize].tree.tile_at(level, &own, active, thing.surface.0, hits, &every)
     }
 
-    /// Offers what [`meet_placed_tile`](Self::meet_placed_tile) found for the ray at `place` of one of those meshes.
-    pub fn offer_placed(&self, meshes: &[u32], hits: &TileHits, place: usize, nearest: &mut Nearest) {
-        let Some(hit) = hits.get(place) else { return };
+    /// Offers what [`meet_placed_tile`](Self::meet_placed_tile) found at `place` for a ray of one of those meshes.
+    /// `false` if the ray passes through that triangle: then others behind it have to be asked.
+    pub fn offer_placed(
+        &self,
+        meshes: &[u32],
+        ray: &Ray,
+        hits: &TileHits,
+        place: usize,
+        nearest: &mut Nearest,
+    ) -> bool {
+        let Some(hit) = hits.get(place) else { return true };
         for index in meshes {
             let thing = &self.placed[*index as usize];
             if let (PlacedTarget::Mesh(mesh), true) = (thing.target, thing.surface.0 == hits.surface[place]) {
-                let part = self.meshes[mesh as usize].part(hit.triangle).surface;
+                let mesh = &self.meshes[mesh as usize];
+                let d = || thing.placement.ray(ray).d.as_vec3();
+                if thing.camera != Opacity::Opaque && !self.seen(mesh, thing.surface.0, hit.triangle, d()) {
+                    return false;
+                }
+                let part = mesh.part(hit.triangle).surface;
                 let point = TrianglePoint { triangle: hit.triangle, u: hit.u, v: hit.v };
                 let at = At::Placed(*index, PlacedSpot::Triangle(point));
                 nearest.offer(hit.t as f64, SurfaceId(thing.surface.0 + part), at);
             }
         }
+        true
     }
 
     /// Offers what a camera ray meets of what has no end.
@@ -257,14 +277,9 @@ impl Geometry {
         }
     }
 
-    /// Whether there is a mesh of the world.
-    pub fn has_world(&self) -> bool {
-        self.world.is_some()
-    }
-
-    /// Whether the mesh of the world can be asked for many rays at once: where no triangle lets some rays pass.
-    pub fn world_as_bundle(&self) -> bool {
-        self.world.as_ref().is_some_and(|world| world.camera == Opacity::Opaque)
+    /// Whether camera rays can meet the mesh of the world.
+    pub fn is_world_seen(&self) -> bool {
+        self.world.as_ref().is_some_and(|world| world.camera != Opacity::Clear)
     }
 
     /// What rays meet of the mesh of the world, at most as far as `hits` says: which rays meet something.
@@ -274,13 +289,18 @@ impl Geometry {
         world.mesh.tree.tile_at(level, rays, active, 0, hits, &every)
     }
 
-    /// Offers what [`meet_world`](Self::meet_world) found for the ray at `place`.
-    pub fn offer_world(&self, hits: &TileHits, place: usize, nearest: &mut Nearest) {
+    /// Offers what [`meet_world`](Self::meet_world) found at `place` for a ray. `false` if the ray passes through that
+    /// triangle: then others behind it have to be asked.
+    pub fn offer_world(&self, ray: &Ray, hits: &TileHits, place: usize, nearest: &mut Nearest) -> bool {
         if let (Some(world), Some(hit)) = (&self.world, hits.get(place)) {
+            if world.camera != Opacity::Opaque && !self.seen(&world.mesh, 0, hit.triangle, ray.d) {
+                return false;
+            }
             let surface = SurfaceId(world.mesh.part(hit.triangle).surface);
             let point = TrianglePoint { triangle: hit.triangle, u: hit.u, v: hit.v };
             nearest.offer(hit.t as f64, surface, At::World(point));
         }
+        true
     }
 
     #[inline(always)]
