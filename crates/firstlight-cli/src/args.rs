@@ -227,11 +227,11 @@ pub struct RenderArgs {
     /// A picture to write: its ending, .png, .jpg, .exr, .npz, .npy or .hdr, says the format; - is standard output.
     /// With NAME= before it, one buffer by itself, as in depth=depth.png (`firstlight buffers` lists them all),
     /// rendered whatever --buffers says; a file whose own name has a = is written as ./a=b.png. {stem} in it is the
-    /// scene's file name without its ending, {name} the whole of it, {parent} the name of its folder; with several
-    /// scenes one of them is needed, in --heat and --stats too. {view} and {size} are those of several views and sizes.
-    /// Folders are there already, but for those that a placeholder names. May be given several times [default: the
-    /// scene's name with .png, or with .render.png where that is a file not written by firstlight; a course file's
-    /// output_file; in the working folder]
+    /// scene's file name without its ending, {name} the whole of it, {parent} the name of its folder, {folder} the path
+    /// of its folder below the one that was given; with several scenes one of them is needed, in --heat and --stats
+    /// too. {view} and {size} are those of several views and sizes. Folders are there already, but for those that a
+    /// placeholder names. May be given several times [default: the scene's name with .png, or with .render.png where
+    /// that is a file not written by firstlight; a course file's output_file; in the working folder]
     #[arg(short, long = "output", value_name = "[NAME=]FILE", value_hint = ValueHint::FilePath)]
     #[arg(help_heading = "Output")]
     pub output: Vec<PathBuf>,

@@ -213,9 +213,18 @@ fn is_model(scene: &Path) -> bool {
 /// The scenes of the command line, with each folder replaced by the models in it and in the folders below it, sorted by
 /// the bytes of their paths. Files and folders whose names begin with a dot are skipped, and links to folders are not
 /// followed. A folder that holds no model, or that cannot be read, is kept in the list: rendering it reports the error.
-pub fn with_folders(scenes: &[PathBuf]) -> Vec<PathBuf> {
-    let is_folder = |scene: &PathBuf| file_of(scene).is_some_and(Path::is_dir);
-    scenes.iter().flat_map(|scene| if is_folder(scene) { models_in(scene) } else { vec![scene.clone()] }).collect()
+/// With each what the placeholders in the names of its outputs stand for.
+pub fn with_folders(scenes: &[PathBuf]) -> Vec<(PathBuf, Names)> {
+    let is_folder = |given: &PathBuf| file_of(given).is_some_and(Path::is_dir);
+    let below = |given: &PathBuf| {
+        let found = if is_folder(given) { models_in(given) } else { vec![given.clone()] };
+        let named = |scene: PathBuf| {
+            let names = names_of(&scene, given);
+            (scene, names)
+        };
+        found.into_iter().map(named).collect::<Vec<_>>()
+    };
+    scenes.iter().flat_map(below).collect()
 }
 
 fn models_in(folder: &Path) -> Vec<PathBuf> {
@@ -362,16 +371,17 @@ pub fn file_of(scene: &Path) -> Option<&Path> {
     is_file.then_some(scene)
 }
 
-/// What the placeholders in the names of its outputs stand for.
-pub fn names_of(scene: &Path) -> Names {
+/// What the placeholders in the names of its outputs stand for; `given`: the scene itself, or the folder that was given
+/// on the command line and holds it.
+fn names_of(scene: &Path, given: &Path) -> Names {
     let builtin_or_stdin = file_of(scene).is_none();
     let whole = |part: Option<&OsStr>| part.map_or_else(|| OsString::from("scene"), OsStr::to_owned);
     if scene == "-" {
-        return Names { stem: whole(None), name: whole(None), parent: whole(None) };
+        return Names { stem: whole(None), name: whole(None), parent: whole(None), folder: ".".into() };
     }
     let name = whole(scene.file_name());
     if builtin_or_stdin {
-        return Names { stem: name.clone(), name, parent: whole(None) };
+        return Names { stem: name.clone(), name, parent: whole(None), folder: ".".into() };
     }
     // As it was written, and of the working folder what it is called
     let folder = scene.parent().unwrap_or(Path::new(""));
@@ -379,7 +389,11 @@ pub fn names_of(scene: &Path) -> Names {
         let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
         folder.canonicalize().ok().and_then(|folder| folder.file_name().map(OsStr::to_owned))
     });
-    Names { stem: whole(scene.file_stem()), name, parent: whole(parent.as_deref()) }
+    // Of a scene that was given by itself the path as it was written: never out of the outputs' own folder
+    let below = if scene == given { folder } else { folder.strip_prefix(given).unwrap_or(folder) };
+    let below: PathBuf = below.components().filter(|part| matches!(part, std::path::Component::Normal(_))).collect();
+    let below = if below.as_os_str().is_empty() { OsString::from(".") } else { below.into_os_string() };
+    Names { stem: whole(scene.file_stem()), name, parent: whole(parent.as_deref()), folder: below }
 }
 
 /// No course file that anybody writes is longer, in bytes.

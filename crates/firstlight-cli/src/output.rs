@@ -8,7 +8,7 @@ use firstlight::{BufferDesc, Format, ImageError, PendingFile, Receipt, StagedFil
 
 mod names;
 
-use names::{NAME, PARENT, SIZE, VIEW, WORDS, filled, placeholder, with_part};
+use names::{FOLDER, NAME, PARENT, SIZE, VIEW, WORDS, filled, placeholder, with_part};
 pub use names::{Names, Part, Several, ViewName, check_placeholders};
 
 use crate::args::{Bits, NamedFormat};
@@ -171,6 +171,11 @@ impl Target {
     /// Whether the name of the scene's folder is in it.
     pub fn has_parent(&self) -> bool {
         self.has(PARENT)
+    }
+
+    /// Whether the path of the scene's folder is in it.
+    pub fn has_folder(&self) -> bool {
+        self.has(FOLDER)
     }
 
     fn has(&self, word: &str) -> bool {

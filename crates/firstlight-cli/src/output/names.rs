@@ -15,6 +15,8 @@ pub struct Names {
     pub name: OsString,
     /// The name of the folder that holds it: `{parent}`.
     pub parent: OsString,
+    /// The path of that folder, from the folder that was given on: `{folder}`.
+    pub folder: OsString,
 }
 
 impl Names {
@@ -24,6 +26,7 @@ impl Names {
             Word::Stem => &self.stem,
             Word::Name => &self.name,
             Word::Parent => &self.parent,
+            Word::Folder => &self.folder,
         }
     }
 }
@@ -34,6 +37,7 @@ pub(super) enum Word {
     Stem,
     Name,
     Parent,
+    Folder,
 }
 
 /// One of the pictures of a scene: what tells its files from those of the others.
@@ -65,7 +69,9 @@ pub(super) fn placeholder(text: &str) -> Option<(std::ops::Range<usize>, Word)> 
 const STEM: &str = "{stem}";
 pub(super) const NAME: &str = "{name}";
 pub(super) const PARENT: &str = "{parent}";
-pub(super) const WORDS: [(&str, Word); 3] = [(STEM, Word::Stem), (NAME, Word::Name), (PARENT, Word::Parent)];
+pub(super) const FOLDER: &str = "{folder}";
+pub(super) const WORDS: [(&str, Word); 4] =
+    [(STEM, Word::Stem), (NAME, Word::Name), (PARENT, Word::Parent), (FOLDER, Word::Folder)];
 pub(super) const VIEW: &str = "{view}";
 pub(super) const SIZE: &str = "{size}";
 
@@ -102,7 +108,7 @@ pub fn check_placeholders(option: &str, target: &Target, several: bool, parts: O
     let is_word = |word: &&str| !word.is_empty() && word.bytes().all(|b| b.is_ascii_lowercase());
     for word in words.filter(is_word) {
         let message = match (word, parts) {
-            ("stem" | "name" | "parent", _) => continue,
+            ("stem" | "name" | "parent" | "folder", _) => continue,
             ("view", Some(Several { views: true, .. })) | ("size", Some(Several { sizes: true, .. })) => continue,
             ("view", Some(_)) => {
                 format!("{option} {name}: {VIEW} is one of --views or of --turntable, and neither is given")
@@ -113,7 +119,7 @@ pub fn check_placeholders(option: &str, target: &Target, several: bool, parts: O
             }
             _ => format!(
                 "{option} {name}: {{{word}}} stands for nothing; {STEM} and {NAME} are those of the scene's file, \
-                 {PARENT} that of its folder"
+                 {PARENT} that of its folder, {FOLDER} the path of it"
             ),
         };
         return Err(Failure::Usage(message));
@@ -129,7 +135,7 @@ pub fn check_placeholders(option: &str, target: &Target, several: bool, parts: O
         let own = shown(&own.with_file_name(format!("{STEM}{ending}")));
         let message = format!(
             "{option} {name} would be one file for several scenes; write '{own}', where {STEM} is the name of each \
-             scene without its ending ({NAME}: with it; {PARENT}: that of its folder)"
+             scene without its ending ({NAME}: with it; {PARENT}: that of its folder; {FOLDER}: its path)"
         );
         return Err(Failure::Usage(message));
     }
@@ -205,11 +211,13 @@ mod tests {
 
     #[test]
     fn placeholders_are_the_names_of_the_scene() {
-        let names = Names { stem: "a{name}".into(), name: "a.ply".into(), parent: "b{stem}".into() };
+        let (stem, name) = ("a{name}".into(), "a.ply".into());
+        let names = Names { stem, name, parent: "b{stem}".into(), folder: "c/b{stem}".into() };
         for (path, expected) in [
             ("{stem}.png", "a{name}.png"),
             ("{parent}-{name}.png", "b{stem}-a.ply.png"),
             ("{name}/{stem}{stem}.png", "a.ply/a{name}a{name}.png"),
+            ("out/{folder}/{name}.png", "out/c/b{stem}/a.ply.png"),
             ("{}{Stem}{stem.png", "{}{Stem}{stem.png"),
         ] {
             assert_eq!(filled(Path::new(path), &names), Path::new(expected), "{path}");

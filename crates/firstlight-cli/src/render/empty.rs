@@ -42,6 +42,7 @@ pub(super) fn failure(name: &str, scene: &Scene) -> Failure {
     let summary = scene.summary();
     let why = match summary.triangles + summary.points {
         0 => "there is nothing in it that could be seen".to_owned(),
+        _ if summary.bounds.is_none() => "none of its triangles has an area and finite corners".to_owned(),
         _ => "what it holds is thinner than the distance between camera rays; more pixels (--size), more camera rays \
               in each (--aa) or another side (--view) may show it"
             .to_owned(),

@@ -121,7 +121,7 @@ impl<'a> Plan<'a> {
         let jobs: Vec<Job> = input::with_folders(&args.scenes)
             .into_iter()
             .enumerate()
-            .map(|(index, scene)| Job { names: input::names_of(&scene), scene, index })
+            .map(|(index, (scene, names))| Job { names, scene, index })
             .collect();
         let several = jobs.len() > 1;
         let parts = Some(pictures.several());
@@ -291,6 +291,8 @@ impl<'a> Plan<'a> {
                         _ if self.jobs[before].names.name == job.names.name || written.has_name() => {
                             if self.jobs[before].names.parent != job.names.parent && !written.has_parent() {
                                 "{parent} in the output's name keeps their folders apart"
+                            } else if self.jobs[before].names.folder != job.names.folder && !written.has_folder() {
+                                "{folder}, the path of a file's folder, in the output's name keeps them apart"
                             } else {
                                 "render them in two calls, to folders of their own"
                             }

@@ -81,6 +81,19 @@ fn a_folder_stands_for_the_models_in_it() {
 }
 
 #[test]
+fn the_folders_of_a_set_are_made_anew() {
+    let folder = with_set();
+    folder.run(&format!("render set set/tables/a.stl -o out/{{folder}}/{{stem}}.png {TINY}")).done();
+    let set = ["chairs/a.png", "chairs/b.png", "set/tables/a.png", "tables/a.png", "tables/old/c.png"];
+    assert_eq!(below(&folder, "out"), set);
+    // Above the folder of the outputs nothing is written
+    fs::create_dir(folder.path("two")).unwrap();
+    let up = format!("render ./set/tables/ set/../set/chairs/a.stl -o two/{{folder}}/{{name}}.png {TINY}");
+    folder.run(&up).done();
+    assert_eq!(below(&folder, "two"), ["a.stl.png", "old/c.stl.png", "set/set/chairs/a.stl.png"]);
+}
+
+#[test]
 fn a_folder_without_models_is_said_and_the_others_are_rendered() {
     let folder = with_set();
     let words = "empty: no file in this folder or below ends in .glb, .gltf, .obj, .ply, .stl";

@@ -83,7 +83,7 @@ fn what_would_be_one_file_is_refused_before_anything_is_rendered() {
         ),
         (
             "one/a.toml two/one/a.toml -o out/{parent}-{stem}.png",
-            "to out/one-a.png; render them in two calls, to folders of their own",
+            "to out/one-a.png; {folder}, the path of a file's folder, in the output's name keeps them apart",
         ),
         // A course file says its own output
         ("one.txt two.txt", "one.txt and two.txt would both be written to course.png"),
