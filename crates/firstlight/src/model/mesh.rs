@@ -139,9 +139,8 @@ fn mtl_files(parts: &mut ModelParts, data: &MeshData, file: &str, assets: &dyn A
     for line in &data.material_files {
         // A name may hold blanks; where there is no file of such a name, the line has several
         if files.is_new(line) && !files.read(line) {
-            let words: Vec<&str> = line.split_whitespace().collect();
-            for word in &words {
-                if (words.len() == 1 || files.is_new(word) && !files.read(word)) && !files.is_full() {
+            for word in &words_of(line) {
+                if (word == line || files.is_new(word) && !files.read(word)) && !files.is_full() {
                     let message = format!("{word:?}: there is no such file of materials");
                     files.warn(message, "its faces are of a light gray; an OBJ file needs its MTL files beside it");
                     files.missing.push(join_path(folder, &word.replace('\\', "/")));
@@ -158,6 +157,12 @@ fn mtl_files(parts: &mut ModelParts, data: &MeshData, file: &str, assets: &dyn A
     let read = files.list.iter().map(|(path, bytes)| (path.clone(), Some(bytes.len() as u64)));
     parts.spare.files.extend(read.chain(files.missing.into_iter().map(|path| (path, None))));
     files.list
+}
+
+/// What stands between the blanks of a line, but for those after a backslash: `a\ b.mtl c.mtl` has two words.
+fn words_of(line: &str) -> Vec<String> {
+    let parted = line.replace("\\ ", "\0");
+    parted.split_whitespace().map(|word| word.replace('\0', " ")).collect()
 }
 
 /// MTL files while they are read.
@@ -195,7 +200,7 @@ impl MtlFiles<'_> {
         let written = written.trim().replace('\\', "/");
         let alone = written.rsplit('/').next().unwrap_or_default();
         let mut refused = None;
-        for path in [written.as_str(), alone] {
+        for path in [written.as_str(), alone].into_iter().filter(|path| !path.is_empty()) {
             let path = join_path(self.folder, path);
             if self.list.iter().any(|(known, _)| *known == path) {
                 return true;
@@ -301,6 +306,8 @@ mod tests {
             ("my mat.mtl", &[("m/my mat.mtl", red)][..]),
             ("none.mtl b.mtl", &[("m/b.mtl", red)]),
             ("C:\\work\\b.mtl", &[("m/b.mtl", red)]),
+            ("my\\ mat.mtl", &[("m/my mat.mtl", red)]),
+            ("none.mtl my\\ own\\ mat.mtl", &[("m/my own mat.mtl", red)]),
         ] {
             let parts = described(&["red"], line, files);
             assert_eq!(of_faces(&parts), ["m/a.obj/red"], "{line}");

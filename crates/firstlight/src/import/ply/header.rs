@@ -94,6 +94,8 @@ impl Element<'_> {
 pub(super) struct Header<'a> {
     pub(super) encoding: DataEncoding,
     pub(super) elements: Vec<Element<'a>>,
+    /// Lines before the first element that begin with no word of the format: they are skipped.
+    pub(super) stray: usize,
     /// The first byte after the header.
     pub(super) body: usize,
 }
@@ -114,6 +116,7 @@ impl<'a> Header<'a> {
         text.pass_line_end();
         let mut encoding = None;
         let mut elements: Vec<Element> = Vec::new();
+        let mut stray = 0;
         loop {
             let line = text.at;
             if text.at_end() {
@@ -158,6 +161,8 @@ impl<'a> Header<'a> {
                         ));
                     }
                 }
+                // Blender 2.4 writes its name there, without the word `comment`
+                _ if elements.is_empty() => stray += 1,
                 other => {
                     let message = format!("{} in the header", shown(other));
                     let hint = "lines begin with format, comment, obj_info, element, property or end_header";
@@ -170,7 +175,7 @@ impl<'a> Header<'a> {
         let Some(encoding) = encoding else {
             return Err(ImportFault::text(0, "the header has no `format`", WRITE_ANEW));
         };
-        Ok(Self { encoding, elements, body: text.at })
+        Ok(Self { encoding, elements, stray, body: text.at })
     }
 
     fn format(text: &mut Cursor, line: usize) -> Result<DataEncoding, ImportFault> {

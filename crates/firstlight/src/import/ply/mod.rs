@@ -8,9 +8,9 @@
 //!   writes); `red green blue alpha` in bytes, where vertices have no colours. The last two part vertices;
 //! - `tristrips`: the list `vertex_indices`, with -1 between strips.
 //!
-//! All else is skipped. Lines end with LF, CR LF or CR; what stands after the last element is ignored with a note. Rows
-//! of text stand on lines of their own; where they do not, the numbers are read wherever lines end, as many programs
-//! do.
+//! All else is skipped, with a note also header lines of an unknown kind before the first element. Lines end with LF,
+//! CR LF or CR; what stands after the last element is ignored with a note. Rows of text stand on lines of their own;
+//! where they do not, the numbers are read wherever lines end, as many programs do.
 //!
 //! Text is read on all threads, a piece of lines each. Binary rows of one length, which vertices nearly always and
 //! faces often are, are converted in place on all threads; others one after another.
@@ -43,6 +43,10 @@ pub(super) fn read(file: &[u8], origin: [f64; 3], progress: &Progress) -> Result
         encoding => binary::read_binary(file, &header, &plan, encoding, progress)?,
     };
     let mut mesh = MeshData::default();
+    if header.stray > 0 {
+        mesh.notes
+            .push(format!("{} lines of the header begin with no word of the format and are ignored", header.stray));
+    }
     let rest = &file[body.end..];
     if !rest.trim_ascii().is_empty() {
         mesh.notes.push(format!("{} bytes after the last element are ignored", rest.len()));
@@ -119,6 +123,17 @@ mod tests {
         let mesh = square(faces, "4 0 1 2 3\n2 0 1\n4 3 2 1 0\n");
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [3, 2, 1], [3, 1, 0]]);
         assert_eq!(mesh.notes, ["1 faces of less than 3 corners are left out"]);
+    }
+
+    #[test]
+    fn a_header_may_have_a_comment_without_the_word() {
+        let odd = format!("ply\nformat ascii 1.0\nCreated by a program\n{SQUARE}end_header\n{CORNERS}");
+        let mesh = read(odd.as_bytes()).unwrap();
+        assert_eq!(mesh.positions.len(), 4);
+        assert_eq!(mesh.notes, ["1 lines of the header begin with no word of the format and are ignored"]);
+        // Later it may be a property with a fault in its name
+        let late = format!("ply\nformat ascii 1.0\n{SQUARE}Created by a program\nend_header\n{CORNERS}");
+        assert!(read(late.as_bytes()).unwrap_err().to_string().contains("`Created` in the header"));
     }
 
     #[test]
