@@ -1,5 +1,6 @@
 //! The command line as it is written. What it means, together with a scene, is decided in each command's own file.
 
+mod display;
 mod values;
 mod words;
 
@@ -10,6 +11,7 @@ use firstlight::{
     BufferDesc, ColorDesc, Flip, LightChange, MotionTo, SamplesDesc, SimdLevel, View, VisibilityMode, Window,
 };
 
+pub use display::DisplayArgs;
 use values::*;
 pub use values::{Frames, NamedView, Shard, Size, color};
 pub use words::*;
@@ -265,10 +267,8 @@ pub struct RenderArgs {
     /// Depth, positions, normals and all else keep their 32 bits
     #[arg(long, help_heading = "Output")]
     pub half: bool,
-    /// Stops of exposure of 8- and 16-bit pictures, -64 to 64: they are multiplied by 2^EV; other files are the same
-    /// with it [default: the scene's]
-    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure, help_heading = "Output")]
-    pub exposure: Option<f64>,
+    #[command(flatten)]
+    pub display: DisplayArgs,
 
     /// Pixels across, 1 to 65536; without --height, the height follows in the scene's aspect ratio [default: the
     /// scene's]
@@ -408,8 +408,8 @@ pub struct RenderArgs {
     /// there [default: renders]
     #[arg(long, value_name = "FILE.toml", require_equals = true, help_heading = "Output")]
     #[arg(value_hint = ValueHint::FilePath)]
-    #[arg(conflicts_with_all = ["output", "bits", "format", "quality", "depth_scale", "half", "exposure", "crop"])]
-    #[arg(conflicts_with_all = ["time", "frames", "shard", "aa_mode", "reference", "visibility"])]
+    #[arg(conflicts_with_all = ["output", "bits", "format", "quality", "depth_scale", "half", "display", "exposure"])]
+    #[arg(conflicts_with_all = ["crop", "time", "frames", "shard", "aa_mode", "reference", "visibility"])]
     #[arg(conflicts_with_all = ["threads", "tile_size", "simd", "stats", "coco", "heat"])]
     #[arg(conflicts_with_all = ["views", "turntable", "summary"])]
     pub print_scene: Option<Option<PathBuf>>,
@@ -569,9 +569,8 @@ pub struct RelightArgs {
     /// The quality of JPEG files, 1 to 100 [default: 90]
     #[arg(long, value_name = "N", value_parser = quality)]
     pub quality: Option<u8>,
-    /// Stops of exposure of 8- and 16-bit pictures, -64 to 64 [default: the scene's]
-    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
-    pub exposure: Option<f64>,
+    #[command(flatten)]
+    pub display: DisplayArgs,
     /// Says nothing but errors
     #[arg(short, long)]
     pub quiet: bool,

@@ -51,8 +51,8 @@ const OPTIONS: &[(&[&str], &str)] = &[
     (&["--tile", "--tiles", "--bucket-size", "--block-size", "-b"], "tiles are --tile-size PIXELS"),
     (&["--ev", "--brightness", "--gain"], "exposure in stops is --exposure EV"),
     (
-        &["--gamma", "--tonemap", "--view-transform"],
-        "the scene says it, as display and gamma in [render]; exposure is --exposure EV",
+        &["--gamma", "--tonemap", "--tone-mapping", "--view-transform"],
+        "it is --display srgb, neutral, linear or gamma=G; exposure is --exposure EV",
     ),
     (&["--fov", "--focal-length"], "the scene says it, as fov_y_deg or focal_length_mm of a [camera]"),
     (&["--auto-smooth", "--smoothing", "--smooth-angle"], "normals of a model are made smooth by --smooth DEGREES"),

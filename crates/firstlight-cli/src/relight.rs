@@ -1,8 +1,6 @@
 //! `firstlight relight`: a picture with other lights, without a render.
 
-use firstlight::{
-    Display, FileSettings, Format, LightChange, NamedPlane, Plane, PlaneNumbers, Relit, encode_planes, relight,
-};
+use firstlight::{FileSettings, Format, LightChange, NamedPlane, Plane, PlaneNumbers, Relit, encode_planes, relight};
 
 use crate::args::RelightArgs;
 use crate::difference;
@@ -29,7 +27,7 @@ pub fn run(args: &RelightArgs) -> Result<(), Failure> {
         let name = shown(&args.file);
         say(format_args!("note: the shadows on shadow catchers are those of {name}: render it again to change them"));
     }
-    let display = Display { exposure: args.exposure.unwrap_or(display.exposure), ..display };
+    let display = args.display.of(&display);
     let watch = Watch::begin();
     let default = FileSettings::default();
     let files = FileSettings { display, jpeg_quality: args.quality.unwrap_or(default.jpeg_quality), ..default };
@@ -62,7 +60,8 @@ fn outputs(args: &RelightArgs) -> Result<Vec<(Target, Format)>, Failure> {
     let any = |is: &dyn Fn(Format) -> bool| outputs.iter().any(|(_, format)| is(*format));
     for (option, is_given, kinds, is_used) in [
         ("--bits", args.bits.is_some(), "PNG", any(&|format| matches!(format, Format::Png8 | Format::Png16))),
-        ("--exposure", args.exposure.is_some(), "PNG and JPEG", any(&Format::is_display_encoded)),
+        ("--display", args.display.display.is_some(), "PNG and JPEG", any(&Format::is_display_encoded)),
+        ("--exposure", args.display.exposure.is_some(), "PNG and JPEG", any(&Format::is_display_encoded)),
         ("--quality", args.quality.is_some(), "JPEG", any(&|format| format == Format::Jpeg)),
     ] {
         if is_given && !is_used {

@@ -72,8 +72,7 @@ impl<'a> Contents<'a> {
         scene: &Scene,
         summary: &mut Summary,
     ) -> Result<Vec<Vec<u8>>, Failure> {
-        let own = scene.display();
-        let display = Display { exposure: plan.exposure.unwrap_or(own.exposure), ..own };
+        let display = plan.display.of(&scene.display());
         let files =
             FileSettings { display, depth_scale: plan.depth_scale, half: plan.half, jpeg_quality: plan.quality };
         let mut bytes = |(output, buffers): &(&Output, Vec<Buffer>)| {

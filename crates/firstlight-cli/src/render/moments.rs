@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use firstlight::{
-    AaMode, Coco, Diagnostic, Display, Framing, Plane, RenderSettings, RenderStats, SamplesDesc, Scene, Severity,
-    Window,
+    AaMode, Coco, Diagnostic, Framing, Plane, RenderSettings, RenderStats, SamplesDesc, Scene, Severity, Window,
 };
 
 use super::contents::Contents;
@@ -207,7 +206,7 @@ impl Run<'_> {
         written?;
         // Last, where it is seen: what there is to say of the picture itself
         if index == 0 && !plan.quiet && settings.crop.is_none() {
-            let display = Display { exposure: plan.exposure.unwrap_or(scene.display().exposure), ..scene.display() };
+            let display = plan.display.of(&scene.display());
             let advice = dark::advice(&self.input.name, &self.input.parsed.desc, &film, &display);
             progress.aside(|| show_diagnostics(advice.as_slice()));
         }

@@ -13,7 +13,7 @@ use firstlight::{
 use super::moments::Moment;
 use super::overrides::{Overrides, sized};
 use super::pictures::{Pictures, Views};
-use crate::args::{AntialiasingMode, Bits, NamedView, RenderArgs, Shard, Terminator};
+use crate::args::{AntialiasingMode, Bits, DisplayArgs, NamedView, RenderArgs, Shard, Terminator};
 use crate::input::{self, Input};
 use crate::output::{self, Content, JsonFile, Names, Output, Target};
 use crate::report::{Failure, say, shown};
@@ -36,7 +36,7 @@ pub(super) struct Plan<'a> {
     pub settings: RenderSettings,
     pub overrides: Overrides<'a>,
     /// Of 8- and 16-bit files, in place of the scene's.
-    pub exposure: Option<f64>,
+    pub display: DisplayArgs,
     /// Units per metre in 16 bits.
     pub depth_scale: f64,
     /// Whether EXR files hold colours in 16-bit floats.
@@ -218,7 +218,7 @@ impl<'a> Plan<'a> {
             summary,
             settings,
             overrides,
-            exposure: args.exposure,
+            display: args.display,
             depth_scale: args.depth_scale.unwrap_or(FileSettings::default().depth_scale),
             half: args.half,
             quality: args.quality.unwrap_or(FileSettings::default().jpeg_quality),

@@ -168,7 +168,10 @@ fn jpeg_files_are_told_verified_and_compared() {
     let light = "relight lights.exr --light #1=x1";
     folder.run(&format!("{light} -o d.jpg --quality 60 --exposure 0")).done();
     folder.run(&format!("{light} -o e.png --quality 60")).exits(2).says(&["--quality", "JPEG"]);
-    folder.run(&format!("{light} -o e.exr --exposure 1")).exits(2).says(&["--exposure", "PNG and JPEG"]);
+    for option in ["--exposure 1", "--display linear"] {
+        let words = [option.split(' ').next().unwrap(), "PNG and JPEG"];
+        folder.run(&format!("{light} -o e.exr {option}")).exits(2).says(&words);
+    }
 }
 
 #[test]

@@ -83,7 +83,7 @@ fn lights_that_are_integrated_are_sampled_at_400_points_by_the_plain_renderer() 
 }
 
 #[test]
-fn an_exposure_touches_8_and_16_bits_only() {
+fn exposure_and_display_touch_8_and_16_bits_only() {
     let folder = Folder::with_scene();
     let bytes = |format: &str, options: &str| {
         let line = format!("render scene.toml --samples exact {options} -o - --format {format}");
@@ -92,7 +92,7 @@ fn an_exposure_touches_8_and_16_bits_only() {
     for format in ["exr", "hdr"] {
         let plain = bytes(format, "");
         assert!(!plain.windows(8).any(|part| part == b"exposure"), "{format}");
-        for options in ["--exposure 6", "--exposure -6.5"] {
+        for options in ["--exposure 6", "--exposure -6.5", "--display neutral", "--display gamma=1.5"] {
             assert!(bytes(format, options) == plain, "{format} {options}");
         }
     }
@@ -101,7 +101,16 @@ fn an_exposure_touches_8_and_16_bits_only() {
         let (plain, bright) = (bytes("png", bits), bytes("png", &format!("{bits} --exposure 2")));
         assert!(said(&plain, "srgb, exposure 0") && said(&bright, "srgb, exposure 2"), "{bits}");
         assert!(Picture::decode(&plain) != Picture::decode(&bright), "{bits}");
+        let linear = bytes("png", &format!("{bits} --display linear --exposure 1"));
+        assert!(said(&linear, "linear, exposure 1") && Picture::decode(&linear) != Picture::decode(&plain), "{bits}");
     }
+    // The words are those of scenes
+    folder.put("linear.toml", SCENE.replace("[render]", "[render]\ndisplay = \"linear\""));
+    let own = folder.run("render linear.toml --samples 4 -o - --format png").done().stdout;
+    let other = folder.run("render scene.toml --samples 4 --display linear -o - --format png").done().stdout;
+    assert!(Picture::decode(&own) == Picture::decode(&other));
+    folder.put("asked.png", &other);
+    folder.run("verify asked.png --scene scene.toml").done();
     // The scene's own decides how exactly lights are integrated, and is asked for in the same way
     folder.put("bright.toml", SCENE.replace("[render]", "[render]\nexposure = 2"));
     let own = folder.run("render bright.toml --samples exact -o - --format png").done().stdout;

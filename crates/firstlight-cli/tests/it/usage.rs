@@ -58,6 +58,7 @@ const BAD: &[(&str, &[&str])] = &[
     ("render scene.toml --threads 1025", &["--threads", "1 to 1024"]),
     ("render scene.toml --tile-size 7", &["--tile-size", "8 to 64"]),
     ("render scene.toml --tile-size 65", &["--tile-size", "8 to 64"]),
+    ("render scene.toml --display filmic", &["--display", "srgb, neutral, linear or gamma=G"]),
     ("render scene.toml --exposure 65", &["--exposure", "-64 to 64"]),
     ("render scene.toml --exposure nan", &["--exposure", "-64 to 64"]),
     ("render scene.toml --crop 1,2,3", &["--crop", "X,Y,WIDTH,HEIGHT"]),
