@@ -1,6 +1,7 @@
 //! The one door to files, and what compiling a description carries along.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -82,6 +83,8 @@ pub struct FolderAssets {
     root: PathBuf,
     allowed: Vec<PathBuf>,
     files: Mutex<BTreeSet<PathBuf>>,
+    /// What is in folders, where it was asked for: the names by those without case.
+    listed: Mutex<HashMap<PathBuf, HashMap<String, OsString>>>,
 }
 
 impl FolderAssets {
@@ -99,13 +102,30 @@ impl FolderAssets {
         for dir in allow {
             allowed.push(canonical(dir)?);
         }
-        Ok(Self { root, allowed, files: Mutex::default() })
+        Ok(Self { root, allowed, files: Mutex::default(), listed: Mutex::default() })
     }
 
     /// The files that were asked for and are there, by their names from the root of the system, links resolved; whether
     /// or not they could be read to their end.
     pub fn files(&self) -> Vec<PathBuf> {
         self.files.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
+    }
+
+    /// The file whose path is this one but for upper and lower case, as systems without case would find it; of several
+    /// the first by its bytes.
+    fn but_for_case(&self, path: &Path) -> Option<PathBuf> {
+        let mut listed = self.listed.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut found = self.root.clone();
+        for part in path.components() {
+            let exact = found.join(part);
+            if exact.exists() {
+                found = exact;
+                continue;
+            }
+            let names = listed.entry(found.clone()).or_insert_with(|| names_in(&found));
+            found.push(names.get(&part.as_os_str().to_str()?.to_lowercase())?);
+        }
+        Some(found)
     }
 
     /// As [`Assets::read`], for a name that no text can hold: one that is not UTF-8.
@@ -119,7 +139,13 @@ impl FolderAssets {
             _ => AssetError::Io(e.to_string()),
         };
         // An absolute `path` replaces the root in `join`; it is held to the same folders
-        let real = match self.root.join(path).canonicalize() {
+        let found = match self.root.join(path).canonicalize() {
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound && !leaves(path) => {
+                self.but_for_case(path).map_or(Err(e), |path| path.canonicalize())
+            }
+            other => other,
+        };
+        let real = match found {
             Ok(real) => real,
             // Say nothing about files elsewhere, not even whether they exist
             Err(e) => {
@@ -149,6 +175,14 @@ impl Assets for FolderAssets {
     fn read(&self, path: &str, limit: u64) -> Result<Vec<u8>, AssetError> {
         self.read_path(Path::new(path), limit)
     }
+}
+
+/// The names of what is in a folder, by those without case.
+fn names_in(folder: &Path) -> HashMap<String, OsString> {
+    let mut names: Vec<OsString> =
+        std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name()).collect();
+    names.sort_by(|a, b| b.cmp(a));
+    names.into_iter().filter_map(|name| Some((name.to_str()?.to_lowercase(), name))).collect()
 }
 
 /// Whether a path, by its words alone, leads out of the folder it starts in.
@@ -598,5 +632,26 @@ pub(crate) fn show(v: &[f64]) -> String {
     match v {
         [x] => x.to_string(),
         _ => format!("[{}]", v.iter().map(f64::to_string).collect::<Vec<_>>().join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_found_whatever_their_case() {
+        let root = tempfile::tempdir().unwrap();
+        std::fs::create_dir(root.path().join("Maps")).unwrap();
+        for name in ["Maps/Wood.PNG", "Maps/b.png", "Maps/B.png"] {
+            std::fs::write(root.path().join(name), name).unwrap();
+        }
+        let assets = FolderAssets::new(root.path(), &[]).unwrap();
+        let read = |path: &str| assets.read(path, 100).map(|bytes| String::from_utf8(bytes).unwrap());
+        assert_eq!(read("maps/wood.png"), Ok("Maps/Wood.PNG".into()));
+        assert_eq!(read("Maps/b.png"), Ok("Maps/b.png".into()));
+        assert_eq!(read("maps/../MAPS/wood.png"), Ok("Maps/Wood.PNG".into()));
+        assert_eq!(read("maps/woods.png"), Err(AssetError::NotFound));
+        assert_eq!(read("../MAPS/wood.png"), Err(AssetError::Outside));
     }
 }

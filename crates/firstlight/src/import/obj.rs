@@ -384,6 +384,10 @@ mod tests {
         assert_eq!(mesh.uvs, [[[0.0; 2], [0.0; 2], [5.0, 6.0]]]);
         assert_eq!(mesh.normals[2], [0.0; 3]);
         assert_eq!(mesh.notes.len(), 2);
+        // 0 where there is none, and a group that is none
+        let zeros = read(&format!("{SQUARE}vt 5 6\nvn 0 0 1\ns null\nf 1/0/1 2/0/0 3/1/1\ns -1\nf 1 2 3\n"));
+        assert_eq!((zeros.uvs[0][0], zeros.uvs[0][2]), ([0.0; 2], [5.0, 6.0]));
+        assert_eq!(zeros.smoothing, [0, 0]);
         // An index may come before what it points to
         assert_eq!(read(&format!("f 1 2 3\n{SQUARE}")).triangles, [[0, 1, 2]]);
     }

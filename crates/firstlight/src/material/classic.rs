@@ -62,14 +62,15 @@ impl Classic {
     pub(super) fn evaluate(
         &self,
         color: impl Fn(&Param<Rgb>) -> Rgb,
+        tint: Rgb,
         number: impl Fn(&Param<f32>) -> f32,
         ambient: Option<(&Ambient, ViewGeometry)>,
         slope_variance: f32,
     ) -> Bsdf {
-        let diffuse = color(&self.diffuse);
+        let base = color(&self.diffuse);
         // The same texture in both is looked up once: config 11 has it so everywhere
         let mut specular = match (self.specular.texture, self.diffuse.texture) {
-            (Some(s), Some(d)) if s == d && self.specular.factor == self.diffuse.factor => diffuse,
+            (Some(s), Some(d)) if s == d && self.specular.factor == self.diffuse.factor => base,
             _ => color(&self.specular),
         };
         let lobe = if specular.is_black() {
@@ -89,7 +90,8 @@ impl Classic {
                 _ => Lobe::BlinnPhong(BlinnPhongLobe::new(shininess)),
             }
         };
-        let answer = self.ambient.as_ref().map_or(diffuse, color);
+        let diffuse = base * tint;
+        let answer = self.ambient.as_ref().map_or(diffuse, |ambient| color(ambient) * tint);
         let ambient = ambient.map_or(answer, |(ambient, view)| ambient.answer(&view, answer, Rgb::BLACK));
         let colors = PerMoment([diffuse, specular, Rgb::BLACK]);
         Bsdf { colors, ambient, lobe }

@@ -112,12 +112,14 @@ impl MetallicRoughness {
     pub(super) fn evaluate(
         &self,
         color: impl Fn(&Param<Rgb>) -> Rgb,
+        tint: Rgb,
         number: impl Fn(&Param<f32>) -> f32,
         ambient: Option<(&Ambient, ViewGeometry)>,
         slope_variance: f32,
     ) -> Bsdf {
         let unit = |param: &Param<f32>| number(param).clamp(0.0, 1.0);
-        let (base_color, metallic, specular) = (color(&self.base_color), unit(&self.metallic), unit(&self.specular));
+        let (base_color, metallic, specular) =
+            (color(&self.base_color) * tint, unit(&self.metallic), unit(&self.specular));
         let dielectric = (color(&self.specular_color) * self.f0).map(|f0| f0.min(1.0)) * specular;
         let strongest = dielectric.r.max(dielectric.g).max(dielectric.b);
         let colors = self.colors(base_color, metallic, specular, dielectric);

@@ -116,10 +116,10 @@ impl Material {
     #[inline(always)]
     pub fn bsdf(&self, si: &SurfaceInteraction, textures: &[Texture], ambient: &Ambient) -> Bsdf {
         let ambient = self.varies_with_view(ambient).then_some((ambient, ViewGeometry::of(si)));
-        let color = |param: &Param<Rgb>| param.color(si, textures) * si.color;
+        let color = |param: &Param<Rgb>| param.color(si, textures);
         // Data is filtered over the pixel's footprint, so that a lobe hardly varies within a pixel
         let number = |param: &Param<f32>| param.number(si, textures, si.footprints_per_pixel);
-        let bsdf = self.evaluate(color, number, ambient, si.slope_variance);
+        let bsdf = self.evaluate(color, si.color, number, ambient, si.slope_variance);
         match self.coat_reflectance(si, textures) {
             None => bsdf,
             Some(reflected) => bsdf.weighted(1.0 - reflected),
@@ -152,22 +152,24 @@ impl Material {
     /// The same on any surface, if it is the same on all.
     pub(crate) fn plain_bsdf(&self, ambient: &Ambient) -> Option<Bsdf> {
         let is_plain = self.may_be_even(ambient) && self.textures().all(|texture| texture.is_none());
-        is_plain.then(|| self.evaluate(|param| param.factor, |param| param.factor, None, 0.0))
+        is_plain.then(|| self.evaluate(|param| param.factor, Rgb::WHITE, |param| param.factor, None, 0.0))
     }
 
-    /// The material in numbers, from the values of its parameters. `ambient`: the light to which the answer varies with
+    /// The material in numbers, from the values of its parameters. `tint`: the colour of the surface itself, as of
+    /// vertices, which the colour of the base is multiplied by. `ambient`: the light to which the answer varies with
     /// the directions at the surface, if it does. `slope_variance`: see [`SurfaceInteraction`].
     #[inline(always)]
     fn evaluate(
         &self,
         color: impl Fn(&Param<Rgb>) -> Rgb,
+        tint: Rgb,
         number: impl Fn(&Param<f32>) -> f32,
         ambient: Option<(&Ambient, ViewGeometry)>,
         slope_variance: f32,
     ) -> Bsdf {
         match &self.reflection {
-            Reflection::Classic(classic) => classic.evaluate(color, number, ambient, slope_variance),
-            Reflection::MetallicRoughness(material) => material.evaluate(color, number, ambient, slope_variance),
+            Reflection::Classic(classic) => classic.evaluate(color, tint, number, ambient, slope_variance),
+            Reflection::MetallicRoughness(material) => material.evaluate(color, tint, number, ambient, slope_variance),
             Reflection::Unlit(_) => unlit::UNLIT,
             Reflection::ShadowCatcher(catcher) => catcher.bsdf(),
         }

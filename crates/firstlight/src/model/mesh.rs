@@ -3,7 +3,9 @@
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
 
-use super::{ModelParts, ModelShape, ModelWarning, MtlSettings, UniqueNames, clay, material_name, read_mtl, shown};
+use super::{
+    ModelParts, ModelShape, ModelWarning, MtlSettings, PictureFinder, UniqueNames, clay, material_name, read_mtl, shown,
+};
 use crate::context::{AssetError, Assets};
 use crate::describe::FilePath;
 use crate::describe::value::join_path;
@@ -43,7 +45,9 @@ pub(crate) fn describe_mesh(data: &MeshData, shown_mesh: &ShownMesh<'_>) -> Mode
     let mut parts = ModelParts::default();
     let mut names: UniqueNames = data.materials.iter().map(|own| material_name(file, own, unlit)).collect();
     let default = names.unique(material_name(file, "default", unlit));
-    let smooth_deg = smooth_deg.or(data.normals.is_empty().then_some(SMOOTH_DEG));
+    // Smoothing groups say themselves where edges are
+    let of_file = if data.smoothing.iter().any(|group| *group != 0) { 180.0 } else { SMOOTH_DEG };
+    let smooth_deg = smooth_deg.or(data.normals.is_empty().then_some(of_file));
     let mut mesh = MeshDesc { file: Some(FilePath(file.to_owned())), smooth_deg, ..MeshDesc::default() };
     let size = data.used_bounds().map_or(0.0, |[low, high]| (high - low).length());
     let described = add_mtl(&mut parts, data, shown_mesh, size);
@@ -77,10 +81,11 @@ fn add_mtl(parts: &mut ModelParts, data: &MeshData, shown_mesh: &ShownMesh<'_>, 
     let mut described = HashSet::new();
     // Many materials may have the same picture
     let alphas: RefCell<HashMap<String, Option<bool>>> = RefCell::default();
+    let pictures = RefCell::new(PictureFinder::new(assets));
     for (path, bytes) in mtl_files(parts, data, file, assets) {
         let inside = path.rsplit_once('/').map_or("", |(folder, _)| folder).to_owned();
         let has_alpha = |picture: &str| {
-            let picture = join_path(&inside, picture);
+            let picture = pictures.borrow_mut().find(join_path(&inside, picture), &inside);
             if let Some(known) = alphas.borrow().get(&picture) {
                 return *known;
             }
@@ -112,7 +117,7 @@ fn add_mtl(parts: &mut ModelParts, data: &MeshData, shown_mesh: &ShownMesh<'_>, 
         parts.spare.pictures.extend(read.unused_pictures.iter().map(|picture| join_path(&inside, picture)));
         for (name, mut texture) in read.textures {
             if let TextureDesc::Image(image) = &mut texture {
-                image.file.0 = join_path(&inside, &image.file.0);
+                image.file.0 = pictures.borrow_mut().find(join_path(&inside, &image.file.0), &inside);
             }
             parts.textures.push((name, texture));
         }
@@ -121,6 +126,7 @@ fn add_mtl(parts: &mut ModelParts, data: &MeshData, shown_mesh: &ShownMesh<'_>, 
             described.insert(name);
         }
     }
+    parts.warnings.extend(pictures.into_inner().warnings);
     described
 }
 
@@ -152,6 +158,13 @@ fn mtl_files(parts: &mut ModelParts, data: &MeshData, file: &str, assets: &dyn A
             files.warn(message, "write the materials of a model into one file");
             break;
         }
+    }
+    // Programs leave the line out, or write an old name into it: the file beside has the model's own
+    let is_named = data.materials.iter().any(|name| !name.is_empty());
+    if files.list.is_empty() && is_named {
+        let name = file.rsplit('/').next().unwrap_or_default();
+        let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+        files.read(&format!("{stem}.mtl"));
     }
     parts.warnings.append(&mut files.warnings);
     let read = files.list.iter().map(|(path, bytes)| (path.clone(), Some(bytes.len() as u64)));
@@ -197,7 +210,9 @@ impl MtlFiles<'_> {
     /// Reads the file of that name, from the folder of the OBJ file; where its path leads nowhere, by its own name
     /// beside it. Answers whether there is one.
     fn read(&mut self, written: &str) -> bool {
-        let written = written.trim().replace('\\', "/");
+        let unquoted = written.trim();
+        let unquoted = unquoted.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).unwrap_or(unquoted);
+        let written = unquoted.replace('\\', "/");
         let alone = written.rsplit('/').next().unwrap_or_default();
         let mut refused = None;
         for path in [written.as_str(), alone].into_iter().filter(|path| !path.is_empty()) {
@@ -300,6 +315,57 @@ mod tests {
     }
 
     #[test]
+    fn a_file_of_materials_is_found_in_quotes_and_by_the_name_of_the_model() {
+        let red = "newmtl red\nKd 1 0 0\n";
+        for (line, files) in [
+            ("\"my mat.mtl\"", &[("m/my mat.mtl", red)][..]),
+            ("old.mtl", &[("m/a.mtl", red)]),
+            ("", &[("m/a.mtl", red)]),
+        ] {
+            let parts = described(&["red"], line, files);
+            assert_eq!(of_faces(&parts), ["m/a.obj/red"], "{line}");
+        }
+        // One that is named is there
+        let parts = described(&["red"], "b.mtl", &[("m/b.mtl", "newmtl blue\n"), ("m/a.mtl", red)]);
+        assert_eq!(of_faces(&parts), ["m/a.obj/default"]);
+    }
+
+    #[test]
+    fn pictures_are_found_beside_the_file_that_names_them() {
+        let files = [("m/a.mtl", "newmtl red\nmap_Kd maps/wood.png\nmap_Ks maps/none.png\n"), ("m/wood.png", "x")];
+        let parts = described(&["red"], "a.mtl", &files);
+        let pictures: Vec<&str> = parts
+            .textures
+            .iter()
+            .map(|(_, texture)| match texture {
+                TextureDesc::Image(image) => image.file.0.as_str(),
+                _ => "",
+            })
+            .collect();
+        assert_eq!(pictures, ["m/wood.png", "m/maps/none.png"]);
+    }
+
+    #[test]
+    fn smoothing_groups_say_themselves_where_edges_are() {
+        let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let of = |smoothing: Vec<u32>, asked| {
+            let data =
+                MeshData { positions: corners.clone(), triangles: vec![[0, 1, 2]], smoothing, ..MeshData::default() };
+            let chosen = |_: &str| None;
+            let assets = MemoryAssets::default();
+            let shown =
+                ShownMesh { file: "m/a.obj", smooth_deg: asked, unlit: false, chosen: &chosen, assets: &assets };
+            match describe_mesh(&data, &shown).shapes.remove(0).shape {
+                ShapeDesc::Mesh(mesh) => mesh.smooth_deg,
+                other => panic!("{other:?}"),
+            }
+        };
+        assert_eq!(of(vec![], None), Some(SMOOTH_DEG));
+        assert_eq!(of(vec![0], None), Some(SMOOTH_DEG));
+        assert_eq!((of(vec![3], None), of(vec![3], Some(20.0))), (Some(180.0), Some(20.0)));
+    }
+
+    #[test]
     fn a_line_names_one_file_with_blanks_or_several() {
         let red = "newmtl red\nKd 1 0 0\n";
         for (line, files) in [
@@ -349,7 +415,8 @@ mod tests {
         let shown = ShownMesh { file: "m/a.obj", smooth_deg: None, unlit: false, chosen: &chosen, assets: &watched };
         assert_eq!(describe_mesh(&data, &shown).materials.len(), 5001);
         let of = |name: &str| watched.1.lock().unwrap().iter().filter(|path| *path == name).count();
-        assert_eq!((of("m/a.mtl"), of("m/x.png")), (1, 1), "{:?}", watched.1.lock().unwrap());
+        // A picture once for whether it is there, once beside it, and once for its alpha
+        assert_eq!((of("m/a.mtl"), of("m/x.png")), (1, 3));
         // Names without end
         data.material_files = vec![(0..100_000).map(|i| format!("{i}.mtl ")).collect()];
         let warnings = describe_mesh(&data, &shown).warnings;

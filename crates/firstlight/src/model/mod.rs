@@ -20,6 +20,8 @@ pub use report::{
 use std::collections::{HashMap, HashSet};
 
 use crate::camera::CameraDesc;
+use crate::context::{AssetError, Assets};
+use crate::describe::value::join_path;
 use crate::describe::{ColorParam, NumberParam};
 use crate::light::LightDesc;
 use crate::material::{MaterialCommonDesc, MaterialDesc, MetallicRoughnessDesc, UnlitDesc};
@@ -68,6 +70,45 @@ pub(crate) struct ModelShape {
 pub(crate) struct ModelWarning {
     pub message: String,
     pub hint: String,
+}
+
+/// Where the pictures of a model are. Each path is asked for once.
+pub(crate) struct PictureFinder<'a> {
+    assets: &'a dyn Assets,
+    found: HashMap<String, String>,
+    /// Of pictures that may not be read.
+    pub warnings: Vec<ModelWarning>,
+}
+
+impl<'a> PictureFinder<'a> {
+    pub fn new(assets: &'a dyn Assets) -> Self {
+        PictureFinder { assets, found: HashMap::new(), warnings: Vec::new() }
+    }
+
+    /// The path of a picture that a file in `folder` names: `path`, or where no such file is there, or it lies outside
+    /// of what may be read, that of the file of the same name in `folder`. All paths are those of the scene.
+    pub fn find(&mut self, path: String, folder: &str) -> String {
+        if let Some(found) = self.found.get(&path) {
+            return found.clone();
+        }
+        // A limit of 0 asks whether it is there
+        let ask = |path: &str| self.assets.read(path, 0).err();
+        let beside = join_path(folder, path.rsplit('/').next().unwrap_or_default());
+        let found = match ask(&path) {
+            Some(AssetError::NotFound) => match ask(&beside) {
+                Some(AssetError::NotFound | AssetError::Outside) => path.clone(),
+                _ => beside,
+            },
+            Some(error @ AssetError::Outside) if beside != path => {
+                let hint = format!("{beside:?} is looked for instead; allow its folder with --allow-dir");
+                self.warnings.push(ModelWarning { message: format!("{path:?}: {error}"), hint });
+                beside
+            }
+            _ => path.clone(),
+        };
+        self.found.insert(path, found.clone());
+        found
+    }
 }
 
 /// Names of which each is given once. A file may give the same one to all its materials: what is taken is not searched.

@@ -15,9 +15,8 @@
 //! - `d` and 1 - `Tr` are `alpha`, `d` before `Tr`; where there is anything to see through, `alpha_mode` is `blend`.
 //! - A number takes the luminance of its map, or the channel that `-imfchan` says; `map_d` takes the alpha of a picture
 //!   that has one.
-//! - A bump map has heights without a unit: the caller says how much 1 is. Some programs, Blender among them, write
-//!   normal maps as `map_Bump`. Nothing in the file tells the two apart, so it is taken at its word; `norm` is a normal
-//!   map.
+//! - A bump map has heights without a unit: the caller says how much 1 is. Blender writes normal maps as `map_Bump` and
+//!   its own name into the first line, so there they are normal maps, as `norm` is everywhere.
 
 use std::collections::{HashMap, HashSet};
 
@@ -64,7 +63,8 @@ pub struct MtlMaterials {
 pub fn read_mtl(name: &str, bytes: &[u8], settings: &MtlSettings<'_>) -> Result<MtlMaterials, ImportError> {
     let mut notes = MtlNotes::default();
     let read = mtl::read(name, bytes, &mut notes)?;
-    let mut file = Translation { settings, notes, textures: MtlTextures::default() };
+    let by_blender = bytes.starts_with(b"# Blender");
+    let mut file = Translation { settings, notes, textures: MtlTextures::default(), by_blender };
     let (wanted, others): (Vec<_>, Vec<_>) = read.iter().partition(|material| (settings.is_wanted)(&material.name));
     let materials = wanted.iter().map(|material| (material.name.clone(), file.material(material))).collect();
     let textures = file.textures.list;
@@ -96,6 +96,8 @@ struct Translation<'a> {
     settings: &'a MtlSettings<'a>,
     notes: MtlNotes,
     textures: MtlTextures,
+    /// Whether Blender wrote the file.
+    by_blender: bool,
 }
 
 impl Translation<'_> {
@@ -150,7 +152,7 @@ impl Translation<'_> {
             if is_unlit {
                 let message = format!("`{word}` changes nothing under illum 0, where no light counts");
                 self.notes.add("unlit map", picture.line, message, "write illum 1 or 2");
-            } else if map == MtlMap::Normal {
+            } else if map == MtlMap::Normal || self.by_blender && common.normal_map.is_none() {
                 (common.normal_map, common.normal_scale) = (Some(self.texture(picture)), picture.bump.clamp(-1e4, 1e4));
             } else {
                 common.bump_map = self.textured(picture, 1.0, [-1e4, 1e4], Channel::Luminance);
@@ -503,6 +505,11 @@ mod tests {
         let common = phong("bump -bm -1 -imfchan r b.png\nnorm n.png").common;
         assert_eq!((common.bump_map, common.bump_scale), (NumberParam::texture("m/b.png"), -0.01));
         assert_eq!(common.normal_map.as_deref(), Some("m/n.png"));
+        // Blender writes normal maps so
+        let blender = of("# Blender 4.1.1 MTL File: ''\nnewmtl a\nillum 2\nmap_Bump -bm 0.5 n.png\n");
+        let MaterialDesc::Phong(PhongDesc { common, .. }) = &blender.materials[0].1 else { panic!() };
+        assert_eq!((common.normal_map.as_deref(), common.normal_scale), (Some("m/n.png"), 0.5));
+        assert_eq!(common.bump_map, NumberParam::constant(0.0));
     }
 
     #[test]

@@ -25,7 +25,7 @@ shape_table! {
     ///
     /// The radius of each is the file's property `radius`, or the list `radii`, or `radius` for all; where nothing says
     /// it, it is 0.7 times the distance to the fourth nearest point, by the median of some. Colours multiply the
-    /// material's diffuse, specular and ambient colours. All spheres of a set have one id; which of them was hit is the
+    /// material's diffuse, ambient and base colours. All spheres of a set have one id; which of them was hit is the
     /// number of the primitive. Spheres without a finite centre and a radius above 0 are left out.
     ///
     /// ```toml

@@ -114,7 +114,8 @@ impl Gltf {
             let there = bytes.len();
             return Err(view.fault(format!("{length} bytes from {offset} on are not in its buffer, which has {there}")));
         };
-        let stride = view.get("byteStride").map(|stride| stride.index()).transpose()?;
+        // 0 is what glTF 1.0 wrote for elements without a gap
+        let stride = view.get("byteStride").map(|stride| stride.index()).transpose()?.filter(|stride| *stride > 0);
         Ok(ViewedBytes { bytes: within, stride })
     }
 

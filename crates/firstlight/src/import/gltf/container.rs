@@ -34,7 +34,8 @@ impl Container {
         let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
         // Chunks are filled up with blanks; some writers take 0
         let end = text.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
-        let json: Value = serde_json::from_slice(&text[..end])
+        // Names of old exporters may be in another encoding
+        let json: Value = serde_json::from_str(&String::from_utf8_lossy(&text[..end]))
             .map_err(|error| damaged(format!("its JSON cannot be read: {error}")))?;
         if !json.is_object() {
             return Err(damaged("its JSON is not an object".into()));
@@ -61,6 +62,11 @@ fn chunks(bytes: &[u8]) -> Result<(std::ops::Range<usize>, Option<std::ops::Rang
         let start = at + CHUNK_HEADER;
         let end = start.checked_add(length as usize).filter(|end| *end <= bytes.len());
         let Some(end) = end else {
+            // Behind the chunks of glTF, whatever was appended to them
+            if json.is_some() && (binary.is_some() || word(8).is_some_and(|length| length > 0 && at >= length as usize))
+            {
+                break;
+            }
             let there = bytes.len() - start;
             return Err(damaged(format!("is cut off: a chunk has {length} bytes, {there} are there")));
         };
@@ -69,7 +75,9 @@ fn chunks(bytes: &[u8]) -> Result<(std::ops::Range<usize>, Option<std::ops::Rang
             BINARY_CHUNK if binary.is_none() => binary = Some(start..end),
             _ => {}
         }
-        at = end.next_multiple_of(4);
+        // Some writers leave out what fills a chunk up
+        let is_chunk = |at: usize| matches!(word(at + 4), Some(JSON_CHUNK | BINARY_CHUNK));
+        at = if is_chunk(end) { end } else { end.next_multiple_of(4) };
     }
     let json = json.ok_or_else(|| damaged("has no JSON chunk".into()))?;
     Ok((json, binary))
@@ -107,6 +115,10 @@ impl<'a> Uri<'a> {
 
 /// The text with `%20` as a blank; what is no UTF-8 then stays as it is.
 fn percent_decoded(text: &str) -> String {
+    String::from_utf8(percent_decoded_bytes(text)).unwrap_or_else(|_| text.to_owned())
+}
+
+fn percent_decoded_bytes(text: &str) -> Vec<u8> {
     let bytes = text.as_bytes();
     let mut out = Vec::with_capacity(bytes.len());
     let mut at = 0;
@@ -123,18 +135,19 @@ fn percent_decoded(text: &str) -> String {
             }
         }
     }
-    String::from_utf8(out).unwrap_or_else(|_| text.to_owned())
+    out
 }
 
 /// The bytes of what stands behind `data:`; `None` if it is no base64.
 pub(super) fn data_bytes(data: &str) -> Option<Vec<u8>> {
     let (kind, digits) = data.split_once(',')?;
+    let decoded = percent_decoded_bytes(digits);
     if !kind.to_ascii_lowercase().ends_with("base64") {
-        return Some(percent_decoded(digits).into_bytes());
+        return Some(decoded);
     }
     let mut out = Vec::with_capacity(digits.len() / 4 * 3);
     let (mut bits, mut count) = (0u32, 0);
-    for byte in digits.bytes() {
+    for byte in decoded {
         let digit = match byte {
             b'A'..=b'Z' => byte - b'A',
             b'a'..=b'z' => byte - b'a' + 26,
@@ -179,6 +192,8 @@ mod tests {
         assert_eq!(of(";base64,TWE="), Some("Ma".into()));
         assert_eq!(of(";base64,TQ"), Some("M".into()));
         assert_eq!(of("text/plain,a%20b"), Some("a b".into()));
+        assert_eq!(of(";base64,TWE%3D"), Some("Ma".into()));
+        assert_eq!(data_bytes(",%00%ff"), Some(vec![0, 255]));
         assert_eq!(of(";base64,T*"), None);
         assert_eq!(of("none"), None);
     }
@@ -188,6 +203,14 @@ mod tests {
         let mut glb = b"glTF\x02\0\0\0\0\0\0\0\x04\0\0\0JSON{ } \x04\0\0\0BIN\0abcd".to_vec();
         let open = |bytes: &[u8]| Container::open(bytes).map(|c| c.binary).map_err(|fault| fault.message);
         assert_eq!(open(&glb), Ok(Some(32..36)));
+        // What was appended, and what a writer did not fill up
+        assert_eq!(open(&[&glb[..], &[b'x'; 16]].concat()), Ok(Some(32..36)));
+        let whole = b"glTF\x02\0\0\0\x18\0\0\0\x04\0\0\0JSON{ } appended by somebody".to_vec();
+        assert_eq!(open(&whole), Ok(None));
+        let bare = b"glTF\x02\0\0\0\0\0\0\0\x03\0\0\0JSON{ }\x04\0\0\0BIN\0abcd".to_vec();
+        assert_eq!(open(&bare), Ok(Some(31..35)));
+        // Names in another encoding
+        assert_eq!(open(b"{ \"asset\": { \"generator\": \"caf\xe9\" } }"), Ok(None));
         glb.pop();
         assert_eq!(open(&glb), Err("is cut off: a chunk has 4 bytes, 3 are there".into()));
         assert_eq!(open(&glb[..20]), Err("is cut off: a chunk has 4 bytes, 0 are there".into()));

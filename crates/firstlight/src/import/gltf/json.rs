@@ -90,6 +90,23 @@ impl<'a> JsonPlace<'a> {
         found
     }
 
+    /// The sets of texture coordinates that the textures of a material name, at any depth.
+    pub fn uv_sets(&self) -> Vec<usize> {
+        let (mut found, mut open) = (Vec::new(), vec![self.value]);
+        while let Some(value) = open.pop() {
+            for (key, value) in value.as_object().into_iter().flatten() {
+                if key.ends_with("Texture") && value.get("index").is_some() {
+                    let moved = value.get("extensions").and_then(|all| all.get("KHR_texture_transform"));
+                    let set = moved.and_then(|moved| moved.get("texCoord")).or(value.get("texCoord"));
+                    found.push(set.and_then(Value::as_u64).map_or(0, |set| usize::try_from(set).unwrap_or(usize::MAX)));
+                } else {
+                    open.push(value);
+                }
+            }
+        }
+        found
+    }
+
     /// The images that a texture names, in extensions too.
     pub fn sources(&self) -> Vec<usize> {
         let extensions = self.get("extensions").and_then(|at| at.value.as_object());

@@ -15,6 +15,8 @@ use crate::math::{DAffine3, DMat3, DMat4, DVec3};
 const PRIMITIVE_BYTES: u64 = 256;
 /// Bytes of a triangle, with its material.
 const TRIANGLE_BYTES: u64 = 16;
+/// Bytes of a vertex that is made of another one.
+const VERTEX_BYTES: u64 = 96;
 /// Sets of texture coordinates that are read; textures can name no more.
 const UV_SETS: usize = 4;
 
@@ -200,11 +202,12 @@ impl Gltf {
                 }
             }
         }
-        if let Some(bones) = posing.bones {
-            self.pose(&attributes, bones, &mut positions, &mut normals, &mut tangents)?;
-        }
+        let mirrored = match posing.bones {
+            Some(bones) => self.pose(&attributes, bones, &mut positions, &mut normals, &mut tangents)?,
+            None => Vec::new(),
+        };
         // Triangles, without those of vertices that there are not
-        let first = data.positions.len() as u32;
+        let (first, first_triangle) = (data.positions.len() as u32, data.triangles.len());
         let indices = match primitive.get("indices") {
             Some(at) => self.wholes::<1>(&at)?.into_flattened(),
             None => {
@@ -216,7 +219,11 @@ impl Gltf {
         self.take(primitive, TRIANGLE_BYTES * triangles)?;
         let mut left_out = 0;
         let mut add = |corners: [u32; 3]| match corners.iter().all(|corner| (*corner as usize) < count) {
-            true => data.triangles.push(corners.map(|corner| first + corner)),
+            true => {
+                let [a, b, c] = corners.map(|corner| first + corner);
+                let is_mirrored = mirrored.get(corners[0] as usize).is_some_and(|is| *is);
+                data.triangles.push(if is_mirrored { [a, c, b] } else { [a, b, c] });
+            }
             false => left_out += 1,
         };
         match topology {
@@ -238,14 +245,24 @@ impl Gltf {
             Some(color) => as_many(&color).and_then(|()| self.vectors::<4>(&color))?,
             None => Vec::new(),
         };
+        let named = self.named_uv_sets(primitive)?;
         for set in 0..UV_SETS {
-            let Some(at) = attributes.get(&format!("TEXCOORD_{set}")) else { break };
+            let Some(at) = attributes.get(&format!("TEXCOORD_{set}")) else {
+                if set < named {
+                    let at = primitive.pointer();
+                    data.notes.push(format!("{at}: has no TEXCOORD_{set}, which its material names: 0, 0 is taken"));
+                }
+                continue;
+            };
             as_many(&at)?;
-            if data.uvs.len() <= set {
+            while data.uvs.len() <= set {
                 data.uvs.push(vec![[0.0; 2]; first as usize]);
             }
             // Row 0 of a picture is v = 0 in glTF, and v = 1 here
             data.uvs[set].extend(self.vectors::<2>(&at)?.iter().map(|[u, v]| [*u, 1.0 - v]));
+        }
+        while data.uvs.len() < named {
+            data.uvs.push(vec![[0.0; 2]; first as usize]);
         }
         data.positions.extend(positions);
         let vertices = data.positions.len();
@@ -262,10 +279,32 @@ impl Gltf {
             data.colors.extend(colors);
             data.colors.resize(vertices, [1.0; 4]);
         }
+        let behind = face_normals_to_front(data, first_triangle);
+        if behind > 0 {
+            self.take(primitive, VERTEX_BYTES * 3 * behind)?;
+            let at = primitive.pointer();
+            data.notes.push(format!("{at}: the normals of {behind} triangles point behind them, and are turned"));
+        }
         Ok(())
     }
 
-    /// Moves vertices by the bones, each by as much as its weight.
+    /// How many sets of texture coordinates the textures of a primitive's materials name.
+    fn named_uv_sets(&self, primitive: &JsonPlace<'_>) -> Result<usize, GltfFault> {
+        let mut materials: Vec<JsonPlace<'_>> = primitive.get("material").into_iter().collect();
+        if let Some(variants) = primitive.extension("KHR_materials_variants") {
+            for mapping in variants.list("mappings")? {
+                materials.extend(mapping.get("material"));
+            }
+        }
+        let mut named = 0;
+        for material in materials {
+            let sets = self.root().of_index("materials", &material)?.uv_sets();
+            named = sets.into_iter().filter(|set| *set < UV_SETS).map(|set| set + 1).fold(named, usize::max);
+        }
+        Ok(named)
+    }
+
+    /// Moves vertices by the bones, each by as much as its weight. Answers which are mirrored by that.
     fn pose(
         &self,
         attributes: &JsonPlace<'_>,
@@ -273,7 +312,7 @@ impl Gltf {
         positions: &mut [[f32; 3]],
         normals: &mut [[f32; 3]],
         tangents: &mut [[f32; 4]],
-    ) -> Result<(), GltfFault> {
+    ) -> Result<Vec<bool>, GltfFault> {
         let mut sums = vec![(DAffine3::ZERO, 0.0f64); positions.len()];
         for set in 0.. {
             let names = [format!("JOINTS_{set}"), format!("WEIGHTS_{set}")];
@@ -316,6 +355,46 @@ impl Gltf {
                 }
             }
         }
-        Ok(())
+        Ok(sums.iter().map(|(moved, weight)| *weight > 0.0 && moved.matrix3.determinant() < 0.0).collect())
     }
+}
+
+/// Turns normals that point behind their triangle to its front, which is where its corners run counter-clockwise: of
+/// the triangles from `first` on whose normals do so on the whole. Such a triangle gets vertices of its own. Answers how
+/// many triangles these are.
+///
+/// Source: "glTF 2.0 specification", section 3.7.2.1, "Meshes".
+fn face_normals_to_front(data: &mut MeshData, first: usize) -> u64 {
+    let mut count = 0;
+    for triangle in first..data.triangles.len() {
+        let corners = data.triangles[triangle].map(|corner| corner as usize);
+        let [a, b, c] = corners.map(|corner| DVec3::from(data.positions[corner].map(f64::from)));
+        let front = (b - a).cross(c - a).normalize_or_zero();
+        let normals = corners.map(|corner| DVec3::from(data.normals[corner].map(f64::from)));
+        if !(normals.iter().sum::<DVec3>().dot(front) < 0.0) {
+            continue;
+        }
+        count += 1;
+        for (k, normal) in normals.into_iter().enumerate() {
+            let height = normal.dot(front);
+            if !(height < 0.0) {
+                continue;
+            }
+            // One that leans behind is mirrored, so that leaves that are lit like a crown stay so; an opposite one is
+            // that of a surface inside out
+            let turned = if height < -0.5 * normal.length() { -normal } else { normal - 2.0 * height * front };
+            let (from, vertex) = (corners[k], data.positions.len());
+            data.positions.push(data.positions[from]);
+            data.normals.push(turned.as_vec3().to_array());
+            data.uvs.iter_mut().for_each(|set| set.push(set[from]));
+            if let Some([x, y, z, sign]) = data.tangents.get(from).copied() {
+                data.tangents.push([x, y, z, -sign]);
+            }
+            if let Some(color) = data.colors.get(from).copied() {
+                data.colors.push(color);
+            }
+            data.triangles[triangle][k] = vertex as u32;
+        }
+    }
+    count
 }

@@ -169,14 +169,14 @@ fn absent_and_sparse_accessors_are_zeros_and_what_replaces_them() {
 fn what_only_some_primitives_have_is_made_up_for_the_others() {
     let mut buffer = Buffer::default();
     let position = buffer.floats("VEC3", 3, &CORNERS);
-    let normal = buffer.floats("VEC3", 3, &[0.0, 0.0, -1.0, 0.0, 0.0, -1.0, 0.0, 0.0, -1.0]);
+    let normal = buffer.floats("VEC3", 3, &[0.0, 0.0, 1.0].repeat(3));
     let uv = buffer.floats("VEC2", 2, &[0.0, 1.0, 1.0, 1.0, 0.0, 0.0]);
     let color = buffer.floats("VEC4", 4, &[0.5; 12]);
     let plain = json!({ "attributes": { "POSITION": position } });
     let rich = json!({ "attributes": { "POSITION": position, "NORMAL": normal, "TEXCOORD_0": uv, "COLOR_0": color } });
     let mesh = mesh_of(&buffer.file(json!({ "meshes": [{ "primitives": [plain, rich, plain] }] })));
     assert_eq!(mesh.fault(), None);
-    assert_eq!(mesh.normals[2..7], [[0.0; 3], [0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [0.0; 3]]);
+    assert_eq!(mesh.normals[2..7], [[0.0; 3], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0; 3]]);
     assert_eq!(mesh.uvs[0][2..5], [[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]);
     assert_eq!((mesh.colors[2], mesh.colors[3], mesh.colors[8]), ([1.0; 4], [0.5; 4], [1.0; 4]));
     assert_eq!(mesh.face_materials, [0, 1, 2]);
@@ -431,4 +431,80 @@ fn tangents_are_morphed_and_turned_with_the_bones() {
     // They go with normals
     attributes.as_object_mut().expect("is an object").remove("NORMAL");
     assert_eq!(of(&attributes), [[[0.0; 4]; 0], [[0.0; 4]; 0]]);
+}
+
+#[test]
+fn the_order_of_corners_says_where_the_front_is() {
+    let mut buffer = Buffer::default();
+    let position = buffer.floats("VEC3", 3, &CORNERS);
+    let of = |buffer: &mut Buffer, normals: [[f32; 3]; 3]| {
+        let normal = buffer.floats("VEC3", 3, normals.as_flattened());
+        let tangent = buffer.floats("VEC4", 4, &[1.0, 0.0, 0.0, 1.0].repeat(3));
+        let attributes = json!({ "POSITION": position, "NORMAL": normal, "TANGENT": tangent });
+        mesh_of(&buffer.file(json!({ "meshes": [{ "primitives": [{ "attributes": attributes }] }] })))
+    };
+    // Inside out
+    let mesh = of(&mut buffer, [[0.0, 0.0, -1.0]; 3]);
+    assert_eq!((mesh.triangles[0], mesh.positions.len()), ([3, 4, 5], 6));
+    close(&mesh.normals[3..], &[[0.0, 0.0, 1.0]; 3]);
+    assert_eq!(mesh.tangents[3], [1.0, 0.0, 0.0, -1.0]);
+    assert_eq!(mesh.notes.len(), 1);
+    // A leaf that is lit like the crown
+    let mesh = of(&mut buffer, [[0.0, 1.0, -0.01], [0.0, 1.0, 0.0], [0.0, 1.0, -0.01]]);
+    assert_eq!(mesh.triangles[0], [3, 1, 4]);
+    close(&mesh.normals, &[[0.0, 1.0, -0.01], [0.0, 1.0, 0.0], [0.0, 1.0, -0.01], [0.0, 1.0, 0.01], [0.0, 1.0, 0.01]]);
+    // On the whole in front
+    let mesh = of(&mut buffer, [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 1.0, -0.1]]);
+    assert_eq!((mesh.triangles[0], mesh.positions.len(), mesh.notes.len()), ([0, 1, 2], 3, 0));
+}
+
+#[test]
+fn bones_that_mirror_turn_the_corners() {
+    let mut buffer = Buffer::default();
+    let position = buffer.floats("VEC3", 3, &CORNERS);
+    let joints = buffer.shorts("VEC4", 4, &[0; 12]);
+    let weights = buffer.floats("VEC4", 4, &[1.0, 0.0, 0.0, 0.0].repeat(3));
+    let gltf = buffer.file(json!({
+        "meshes": [{ "primitives": [{ "attributes": {
+            "POSITION": position, "JOINTS_0": joints, "WEIGHTS_0": weights,
+        } }] }],
+        "skins": [{ "joints": [1] }],
+        "nodes": [{ "mesh": 0, "skin": 0 }, { "scale": [-1, 1, 1] }],
+    }));
+    let mesh = gltf.mesh(&MeshAddress::Node(0, None)).unwrap_or_else(|fault| panic!("{fault:?}"));
+    assert_eq!((mesh.triangles[0], mesh.positions[1]), ([0, 2, 1], [-1.0, 0.0, 0.0]));
+}
+
+#[test]
+fn sets_of_texture_coordinates_that_materials_name_are_there() {
+    let mut buffer = Buffer::default();
+    let position = buffer.floats("VEC3", 3, &CORNERS);
+    let uv = buffer.floats("VEC2", 2, &[0.25, 0.75, 0.5, 0.5, 1.0, 0.0]);
+    let of = |attributes: Value, material: Value| {
+        mesh_of(&buffer.file(json!({
+            "meshes": [{ "primitives": [{ "attributes": attributes, "material": 0 }] }],
+            "materials": [material],
+        })))
+    };
+    let named = json!({ "occlusionTexture": { "index": 0, "texCoord": 1 } });
+    let mesh = of(json!({ "POSITION": position, "TEXCOORD_0": uv }), named.clone());
+    assert_eq!((mesh.uvs[0][0], mesh.uvs[1].clone()), ([0.25, 0.25], vec![[0.0; 2]; 3]));
+    assert_eq!(mesh.notes, ["/meshes/0/primitives/0: has no TEXCOORD_1, which its material names: 0, 0 is taken"]);
+    let mesh = of(json!({ "POSITION": position, "TEXCOORD_1": uv }), named);
+    assert_eq!((mesh.uvs[0].clone(), mesh.uvs[1][0]), (vec![[0.0; 2]; 3], [0.25, 0.25]));
+    let moved = json!({ "index": 0, "extensions": { "KHR_texture_transform": { "texCoord": 2 } } });
+    let mesh = of(json!({ "POSITION": position }), json!({ "normalTexture": moved }));
+    assert_eq!(mesh.uvs.len(), 3);
+    let mesh = of(json!({ "POSITION": position }), json!({}));
+    assert_eq!((mesh.uvs.len(), mesh.notes.len()), (0, 0));
+}
+
+#[test]
+fn a_stride_of_0_is_none() {
+    let mut buffer = Buffer::default();
+    let position = buffer.floats("VEC3", 3, &CORNERS);
+    buffer.views[0]["byteStride"] = 0.into();
+    let mesh =
+        mesh_of(&buffer.file(json!({ "meshes": [{ "primitives": [{ "attributes": { "POSITION": position } }] }] })));
+    close(&mesh.positions, &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
 }

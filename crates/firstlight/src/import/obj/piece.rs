@@ -196,11 +196,11 @@ impl<'a> Piece<'a> {
         skip_blanks(text);
         let at = text.at;
         let group = match word(text) {
-            b"off" | b"" => 0,
+            b"off" | b"" | b"null" => 0,
             b"on" => 1,
-            word => match std::str::from_utf8(word).ok().and_then(|w| w.parse().ok()) {
-                Some(group) => group,
-                None => {
+            word => match std::str::from_utf8(word).ok().and_then(|w| w.parse::<i64>().ok()) {
+                Some(group) if group <= i64::from(u32::MAX) => group.max(0) as u32,
+                _ => {
                     let message = format!("smoothing group {}", shown(word));
                     return Err(ImportFault::text(at, message, "give a whole number from 0 to 4294967295, or `off`"));
                 }
@@ -287,6 +287,8 @@ pub(super) fn corner(text: &mut Cursor, counts: [usize; 3]) -> Result<[i32; 3], 
             return Err(bad_corner(text, at));
         }
         *place = match (negative, index) {
+            // Some programs write 0 for texture coordinates and normals that are not there
+            (_, 0) if i > 0 => NONE,
             (_, 0) => return Err(zero(text, at)),
             (false, 1..=MAX_INDEX) => index as i32,
             (true, 1..=0x1fff_ffff) => (RELATIVE + counts[i] as i64 - index) as i32,

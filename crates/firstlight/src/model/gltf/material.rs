@@ -4,7 +4,7 @@
 
 use std::collections::HashMap;
 
-use super::super::{ModelParts, ModelWarning, UniqueNames, clay, material_name, shown};
+use super::super::{ModelParts, ModelWarning, PictureFinder, UniqueNames, clay, material_name, shown};
 use super::{ShownModel, no_such};
 use crate::describe::{Channel, ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc};
 use crate::image::read::{Limits, read_header};
@@ -27,6 +27,7 @@ pub(super) struct Materials<'a> {
     known_textures: HashMap<String, usize>,
     /// Whether pictures have alpha.
     alphas: HashMap<PictureAddress, bool>,
+    pictures: PictureFinder<'a>,
     warnings: Vec<ModelWarning>,
 }
 
@@ -71,6 +72,7 @@ impl<'a> Materials<'a> {
             texture_names: UniqueNames::default(),
             known_textures: HashMap::new(),
             alphas: HashMap::new(),
+            pictures: PictureFinder::new(shown.assets),
             warnings: Vec::new(),
         })
     }
@@ -80,6 +82,7 @@ impl<'a> Materials<'a> {
         parts.materials.extend(self.materials);
         parts.textures.extend(self.textures);
         parts.warnings.extend(self.warnings);
+        parts.warnings.extend(self.pictures.warnings);
     }
 
     /// The name in the scene of the material of a primitive.
@@ -138,7 +141,8 @@ impl<'a> Materials<'a> {
         let mut common = self.common(at, base.as_ref(), factors[3])?;
         let base_color = color(factors, base);
         if at.extension("KHR_materials_unlit").is_some() {
-            common.normal_map = None;
+            // The others are there for readers without the extension
+            (common.normal_map, common.emissive) = (None, MaterialCommonDesc::default().emissive);
             return Ok(MaterialDesc::Unlit(UnlitDesc { color: base_color, common }));
         }
         let data = self.texture(of_pbr("metallicRoughnessTexture"))?;
@@ -186,17 +190,26 @@ impl<'a> Materials<'a> {
         }
         if let Some(transmission) = at.extension("KHR_materials_transmission") {
             let part = transmission.number_or("transmissionFactor", 0.0)?.clamp(0.0, 1.0);
-            if part > 0.0 {
+            // A metal lets no light through; a texture may say where it is none
+            let dielectric = 1.0 - if desc.metallic.texture.is_none() { desc.metallic.factor } else { 0.0 };
+            let part = part * dielectric;
+            // What is cut out by a mask has no other alpha
+            if part > 0.0 && desc.common.alpha_mode != AlphaMode::Mask {
                 // Thin and clear: what the base colour lets through
                 let [r, g, b] = desc.base_color.factor.linear;
                 let through = part * CLEAREST * (0.2126 * r + 0.7152 * g + 0.0722 * b).clamp(0.0, 1.0);
                 let texture = self.texture(transmission.get("transmissionTexture"))?;
                 let common = &mut desc.common;
-                common.alpha = match texture {
-                    Some(texture) => {
-                        NumberParam { texture: Some(texture.name), channel: Channel::R, factor: -through, bias: 1.0 }
-                    }
-                    None => NumberParam::constant(1.0 - through),
+                let coverage = if common.alpha_mode == AlphaMode::Blend { common.alpha.clone() } else { 1.0.into() };
+                common.alpha = match (coverage.texture.is_some(), texture) {
+                    (false, Some(texture)) => NumberParam {
+                        texture: Some(texture.name),
+                        channel: Channel::R,
+                        factor: -through * coverage.factor,
+                        bias: coverage.factor,
+                    },
+                    // One texture at most: that of the coverage
+                    _ => NumberParam { factor: coverage.factor * (1.0 - through), ..coverage },
                 };
                 common.alpha_mode = AlphaMode::Blend;
                 let message = format!("the material {name:?} transmits light: it is shown as a thin veil");
@@ -271,7 +284,12 @@ impl<'a> Materials<'a> {
                 Some(base) => NumberParam { factor: alpha, ..NumberParam::channel(&*base.name, Channel::A) },
                 None => NumberParam::constant(alpha),
             };
-            common.cutoff = at.number_or("alphaCutoff", 0.5)?.clamp(0.0, 1.0);
+            let cutoff = at.number_or("alphaCutoff", 0.5)?;
+            common.cutoff = cutoff.clamp(0.0, 1.0);
+            // Above 1 nothing is left
+            if mode == AlphaMode::Mask && cutoff > 1.0 {
+                (common.alpha, common.cutoff) = (NumberParam::constant(0.0), 1.0);
+            }
         }
         if let Some(map) = at.get("normalTexture") {
             common.normal_scale = map.number_or("scale", 1.0)?.clamp(-1e4, 1e4);
@@ -304,7 +322,10 @@ impl<'a> Materials<'a> {
         let (file, picture) = match (image.get("bufferView"), image.text_of("uri")) {
             (None, Some(uri)) => match Uri::of(uri, self.gltf.folder()) {
                 Uri::Data(_) => (inside(), PictureAddress::Inside(source)),
-                Uri::File(path) => (path.clone(), PictureAddress::File(path)),
+                Uri::File(path) => {
+                    let path = self.pictures.find(path, self.gltf.folder());
+                    (path.clone(), PictureAddress::File(path))
+                }
                 Uri::Scheme(_) => (uri.to_owned(), PictureAddress::File(uri.to_owned())),
             },
             _ => (inside(), PictureAddress::Inside(source)),

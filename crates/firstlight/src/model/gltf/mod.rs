@@ -161,7 +161,10 @@ impl Importer<'_> {
             self.light(&light, named(), node.world)?;
         }
         if let Some(camera) = at.get("camera") {
-            self.camera(&root.of_index("cameras", &camera)?, named(), node.world)?;
+            let camera = root.of_index("cameras", &camera)?;
+            let own = camera.text_of("name").filter(|own| !own.is_empty());
+            let called = name.or(own).map_or_else(named, str::to_owned);
+            self.camera(&camera, called, node.world)?;
         }
         Ok(())
     }

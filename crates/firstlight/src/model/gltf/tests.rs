@@ -222,9 +222,11 @@ fn an_unlit_material_is_its_colour() {
     let desc = material(json!({
         "pbrMetallicRoughness": { "baseColorFactor": [0.1, 0.2, 0.3, 1], "baseColorTexture": { "index": 0 } },
         "normalTexture": { "index": 1 },
+        "emissiveFactor": [1, 1, 0], "emissiveTexture": { "index": 2 },
         "extensions": { "KHR_materials_unlit": {} },
     }));
     let MaterialDesc::Unlit(desc) = desc else { panic!("{desc:?}") };
+    assert_eq!(desc.common.emissive, ColorParam::gray(0.0));
     assert_eq!((desc.color, desc.common.normal_map), (colored(0, [0.1, 0.2, 0.3]), None));
 }
 
@@ -260,7 +262,9 @@ fn what_transmits_light_is_a_veil() {
             transmission["transmissionTexture"] = texture;
         }
         let parts = parts_of(file_with(json!({
-            "name": "pane", "extensions": { "KHR_materials_transmission": transmission },
+            "name": "pane",
+            "pbrMetallicRoughness": { "metallicFactor": 0 },
+            "extensions": { "KHR_materials_transmission": transmission },
         })));
         assert_eq!(
             warnings(&parts),
@@ -276,6 +280,26 @@ fn what_transmits_light_is_a_veil() {
     let alpha = of(json!({ "index": 2 }));
     assert_eq!((alpha.texture, alpha.channel, alpha.bias), (Some(texture(2)), Channel::R, 1.0));
     assert!((alpha.factor + 0.425).abs() < 1e-12);
+    // What is not there lets all through, and what is there half of the dielectric part
+    let of = |mut material: Value| {
+        material["extensions"] = json!({ "KHR_materials_transmission": { "transmissionFactor": 0.5 } });
+        let parts = parts_of(file_with(material));
+        let MaterialDesc::MetallicRoughness(desc) = &parts.materials[0].1 else { panic!() };
+        (desc.common.alpha_mode, desc.common.alpha.clone())
+    };
+    let base = |alpha: f64| {
+        json!({
+            "baseColorFactor": [1, 1, 1, alpha], "baseColorTexture": { "index": 0 }, "metallicFactor": 0,
+        })
+    };
+    let (mode, alpha) = of(json!({ "alphaMode": "BLEND", "pbrMetallicRoughness": base(0.5) }));
+    assert_eq!((mode, alpha.texture, alpha.channel), (AlphaMode::Blend, Some(texture(0)), Channel::A));
+    assert!((alpha.factor - 0.5 * 0.575).abs() < 1e-12);
+    let (mode, alpha) = of(json!({ "alphaMode": "MASK", "pbrMetallicRoughness": base(1.0) }));
+    assert_eq!((mode, alpha.factor), (AlphaMode::Mask, 1.0));
+    let metal = |metallic: f64| json!({ "pbrMetallicRoughness": { "metallicFactor": metallic } });
+    assert_eq!(of(metal(1.0)).0, AlphaMode::Opaque);
+    assert!((of(metal(0.5)).1.factor - 0.7875).abs() < 1e-12);
     // Without a factor nothing is let through
     let none = metallic(json!({ "extensions": { "KHR_materials_transmission": {} } }));
     assert_eq!(none.common.alpha_mode, AlphaMode::Opaque);
@@ -504,6 +528,8 @@ fn cameras() {
     let desc = &all[0].1;
     assert!((desc.fov_y_deg.expect("is said") - 60.0).abs() < 1e-9);
     assert_eq!((desc.position, desc.look_at, desc.up), ([0.0, 0.0, 5.0], [0.0; 3], [0.0, 1.0, 0.0]));
+    let named = camera(json!({ "name": "front", "type": "perspective", "perspective": { "yfov": 1 } }));
+    assert_eq!(named.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["front", "node 0"]);
     let all = camera(json!({ "type": "orthographic", "orthographic": { "xmag": 3, "ymag": 2 } }));
     assert_eq!((all[0].1.projection, all[0].1.height), (Projection::Orthographic, Some(4.0)));
 }

@@ -26,7 +26,7 @@ shape_table! {
     ///
     /// Corners run counterclockwise around the front; where the mesh has normals, those decide which side is the front.
     /// Triangles without area, and those with a coordinate that is no number, are left out. Colours of the vertices
-    /// multiply the material's diffuse, specular and ambient colours. Where a file names materials (OBJ `usemtl`), each
+    /// multiply the material's diffuse, ambient and base colours. Where a file names materials (OBJ `usemtl`), each
     /// face has the scene's material of that name, if there is one, otherwise the mesh's own.
     ///
     /// ```toml
