@@ -161,7 +161,7 @@ fn mtl_files(parts: &mut ModelParts, data: &MeshData, file: &str, assets: &dyn A
     }
     // Programs leave the line out, or write an old name into it: the file beside has the model's own
     let is_named = data.materials.iter().any(|name| !name.is_empty());
-    if files.list.is_empty() && is_named {
+    if files.list.is_empty() && is_named && !files.is_full() {
         let name = file.rsplit('/').next().unwrap_or_default();
         let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
         files.read(&format!("{stem}.mtl"));

@@ -360,8 +360,8 @@ impl Gltf {
 }
 
 /// Turns normals that point behind their triangle to its front, which is where its corners run counter-clockwise: of
-/// the triangles from `first` on whose normals do so on the whole. Such a triangle gets vertices of its own. Answers how
-/// many triangles these are.
+/// the triangles from `first` on whose normals do so on the whole. Such a triangle gets vertices of its own. Answers
+/// how many triangles these are.
 ///
 /// Source: "glTF 2.0 specification", section 3.7.2.1, "Meshes".
 fn face_normals_to_front(data: &mut MeshData, first: usize) -> u64 {
