@@ -8,9 +8,9 @@ use super::values::exposure;
 /// The options.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct DisplayArgs {
-    /// How linear light becomes the numbers of 8- and 16-bit pictures: srgb, neutral (the tone mapping PBR Neutral of
-    /// Khronos, then sRGB), linear, or gamma=G, 0.1 to 10; other files are the same with it [default: the scene's; of
-    /// models neutral]
+    /// How linear light becomes the numbers of 8- and 16-bit pictures: srgb, neutral (Khronos's PBR Neutral tone
+    /// mapping, then sRGB), linear, or gamma=G, 0.1 to 10. Other formats are not affected [default: the scene's; of a
+    /// model by itself that of the studio: neutral, but for flat and none]
     #[arg(long, value_name = "WORD", value_parser = curve, help_heading = "Output")]
     pub display: Option<Curve>,
     /// Stops of exposure of 8- and 16-bit pictures, -64 to 64: they are multiplied by 2^EV; other files are the same

@@ -83,7 +83,8 @@ pub struct MeshData {
     pub triangles: Vec<[u32; 3]>,
     /// Per triangle: an index into `materials`.
     pub face_materials: Vec<u32>,
-    /// The names of materials, in the order of their first use. Empty text: faces before the first name.
+    /// The names of materials, in the order of their first use; of glTF, one for each primitive. Empty text: faces
+    /// before the first name.
     pub materials: Vec<String>,
     /// The names of material files (OBJ `mtllib`), as written. They are not opened.
     pub material_files: Vec<String>,

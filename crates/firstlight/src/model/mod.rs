@@ -72,11 +72,12 @@ pub(crate) struct ModelWarning {
     pub hint: String,
 }
 
-/// Where the pictures of a model are. Each path is asked for once.
+/// Finds the picture files of a model. The answer for a path is kept.
 pub(crate) struct PictureFinder<'a> {
     assets: &'a dyn Assets,
-    found: HashMap<String, String>,
-    /// Of pictures that may not be read.
+    /// By path and folder.
+    found: HashMap<(String, String), String>,
+    /// Warnings about pictures that may not be read.
     pub warnings: Vec<ModelWarning>,
 }
 
@@ -85,28 +86,33 @@ impl<'a> PictureFinder<'a> {
         PictureFinder { assets, found: HashMap::new(), warnings: Vec::new() }
     }
 
-    /// The path of a picture that a file in `folder` names: `path`, or where no such file is there, or it lies outside
-    /// of what may be read, that of the file of the same name in `folder`. All paths are those of the scene.
+    /// The path of a picture that a file in `folder` names: `path` if there is such a file; if not, the same file name
+    /// in `folder` if there is one, else `path`. If `path` may not be read, the file name in `folder`, unchecked, with
+    /// a warning. Paths are relative to the scene.
     pub fn find(&mut self, path: String, folder: &str) -> String {
-        if let Some(found) = self.found.get(&path) {
+        let key = (path, folder.to_owned());
+        if let Some(found) = self.found.get(&key) {
             return found.clone();
         }
+        let path = &key.0;
         // A limit of 0 asks whether it is there
         let ask = |path: &str| self.assets.read(path, 0).err();
         let beside = join_path(folder, path.rsplit('/').next().unwrap_or_default());
-        let found = match ask(&path) {
+        let found = match ask(path) {
             Some(AssetError::NotFound) => match ask(&beside) {
                 Some(AssetError::NotFound | AssetError::Outside) => path.clone(),
                 _ => beside,
             },
-            Some(error @ AssetError::Outside) if beside != path => {
-                let hint = format!("{beside:?} is looked for instead; allow its folder with --allow-dir");
+            Some(error @ AssetError::Outside) if beside != *path => {
+                let hint = format!(
+                    "{beside:?} is looked for instead; --allow-dir with the folder of {path:?} allows to read it"
+                );
                 self.warnings.push(ModelWarning { message: format!("{path:?}: {error}"), hint });
                 beside
             }
             _ => path.clone(),
         };
-        self.found.insert(path, found.clone());
+        self.found.insert(key, found.clone());
         found
     }
 }

@@ -1,7 +1,7 @@
 //! The primitives of a mesh, as one [`MeshData`].
 //!
-//! Each primitive is a material of its own: number i of [`MeshData::materials`] is that of primitive i, whatever it
-//! says its material is, since variants of a file give primitives other materials.
+//! Entry i of [`MeshData::materials`] is the material name of primitive i, so a name may occur several times.
+//! Primitives share no entry, because a variant may give each another material.
 //!
 //! Source: "glTF 2.0 specification", section 3.7.
 
@@ -17,16 +17,18 @@ const PRIMITIVE_BYTES: u64 = 256;
 const TRIANGLE_BYTES: u64 = 16;
 /// Bytes of a vertex that is made of another one.
 const VERTEX_BYTES: u64 = 96;
+/// Texture coordinates of vertices without: 0, 0 in glTF, v turned.
+const NO_UV: [f32; 2] = [0.0, 1.0];
 /// Sets of texture coordinates that are read; textures can name no more.
 const UV_SETS: usize = 4;
 
-/// What of a mesh is read.
+/// Which mesh to read, and in which pose.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum MeshAddress {
-    /// Mesh number so much, with the weights of its own.
+    /// The mesh with this index, with its default morph weights.
     Mesh(usize),
-    /// The mesh of node number so much, as it is posed at rest or at a moment: by the weights of the node and, where it
-    /// has a skin, by its bones, which give it its place in the scene of the file.
+    /// The mesh of the node with this index, as it is posed at rest or at a moment: by the weights of the node and,
+    /// where it has a skin, by its bones, which give it its place in the scene of the file.
     Node(usize, Option<Pose>),
 }
 
@@ -107,11 +109,12 @@ impl Gltf {
             data.materials.push(name);
             self.add_primitive(&mut data, primitive, i as u32, &posing)?;
         }
-        // All lists have to be as long as there are vertices
         let vertices = data.positions.len();
+        // No primitive has normals
         if data.normals.iter().all(|normal| *normal == [0.0; 3]) {
             data.normals.clear();
         }
+        // Each list is as long as there are vertices
         debug_assert!(data.uvs.iter().all(|set| set.len() == vertices));
         if vertices as u64 > MAX_COUNT {
             return Err(mesh.fault(format!("has {vertices} vertices, the limit is {MAX_COUNT}")));
@@ -206,7 +209,7 @@ impl Gltf {
             Some(bones) => self.pose(&attributes, bones, &mut positions, &mut normals, &mut tangents)?,
             None => Vec::new(),
         };
-        // Triangles, without those of vertices that there are not
+        // Triangles, except those with an index out of range
         let (first, first_triangle) = (data.positions.len() as u32, data.triangles.len());
         let indices = match primitive.get("indices") {
             Some(at) => self.wholes::<1>(&at)?.into_flattened(),
@@ -250,19 +253,20 @@ impl Gltf {
             let Some(at) = attributes.get(&format!("TEXCOORD_{set}")) else {
                 if set < named {
                     let at = primitive.pointer();
-                    data.notes.push(format!("{at}: has no TEXCOORD_{set}, which its material names: 0, 0 is taken"));
+                    data.notes
+                        .push(format!("{at}: has no TEXCOORD_{set}, which its material names: all vertices get 0, 0"));
                 }
                 continue;
             };
             as_many(&at)?;
             while data.uvs.len() <= set {
-                data.uvs.push(vec![[0.0; 2]; first as usize]);
+                data.uvs.push(vec![NO_UV; first as usize]);
             }
             // Row 0 of a picture is v = 0 in glTF, and v = 1 here
             data.uvs[set].extend(self.vectors::<2>(&at)?.iter().map(|[u, v]| [*u, 1.0 - v]));
         }
         while data.uvs.len() < named {
-            data.uvs.push(vec![[0.0; 2]; first as usize]);
+            data.uvs.push(vec![NO_UV; first as usize]);
         }
         data.positions.extend(positions);
         let vertices = data.positions.len();
@@ -273,7 +277,7 @@ impl Gltf {
             data.tangents.extend(tangents);
             data.tangents.resize(vertices, [0.0; 4]);
         }
-        data.uvs.iter_mut().for_each(|set| set.resize(vertices, [0.0; 2]));
+        data.uvs.iter_mut().for_each(|set| set.resize(vertices, NO_UV));
         if !colors.is_empty() || !data.colors.is_empty() {
             data.colors.resize(first as usize, [1.0; 4]);
             data.colors.extend(colors);
@@ -283,7 +287,7 @@ impl Gltf {
         if behind > 0 {
             self.take(primitive, VERTEX_BYTES * 3 * behind)?;
             let at = primitive.pointer();
-            data.notes.push(format!("{at}: the normals of {behind} triangles point behind them, and are turned"));
+            data.notes.push(format!("{at}: in {behind} triangles, normals that point behind the triangle are turned"));
         }
         Ok(())
     }
@@ -304,7 +308,7 @@ impl Gltf {
         Ok(named)
     }
 
-    /// Moves vertices by the bones, each by as much as its weight. Answers which are mirrored by that.
+    /// Moves vertices by the bones, each by as much as its weight. Returns which vertices that mirrors.
     fn pose(
         &self,
         attributes: &JsonPlace<'_>,
@@ -343,7 +347,7 @@ impl Gltf {
             positions[i] = position.as_vec3().to_array();
             if let Some(normal) = normals.get_mut(i) {
                 let n = DVec3::from(normal.map(f64::from));
-                // The inverse transpose, but for its length: that of the cofactors
+                // The matrix of the cofactors is the inverse transpose times the determinant, of which the sign counts
                 let [x, y, z] = [moved.matrix3.x_axis, moved.matrix3.y_axis, moved.matrix3.z_axis];
                 let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
                 let side = if moved.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
@@ -359,9 +363,10 @@ impl Gltf {
     }
 }
 
-/// Turns normals that point behind their triangle to its front, which is where its corners run counter-clockwise: of
-/// the triangles from `first` on whose normals do so on the whole. Such a triangle gets vertices of its own. Answers
-/// how many triangles these are.
+/// Turns normals that point behind their triangle. The front of a triangle is the side from which its corners run
+/// counter-clockwise. For each triangle from `first` on: if the sum of its normals points behind it, each corner whose
+/// normal points behind it gets a vertex of its own with the normal turned to the front. Returns the number of such
+/// triangles.
 ///
 /// Source: "glTF 2.0 specification", section 3.7.2.1, "Meshes".
 fn face_normals_to_front(data: &mut MeshData, first: usize) -> u64 {
@@ -380,8 +385,8 @@ fn face_normals_to_front(data: &mut MeshData, first: usize) -> u64 {
             if !(height < 0.0) {
                 continue;
             }
-            // One that leans behind is mirrored, so that leaves that are lit like a crown stay so; an opposite one is
-            // that of a surface inside out
+            // A normal at most 30 degrees behind the plane of the triangle is reflected in it, which keeps the normals
+            // of leaves that are those of the tree's crown. One further behind is that of a surface inside out
             let turned = if height < -0.5 * normal.length() { -normal } else { normal - 2.0 * height * front };
             let (from, vertex) = (corners[k], data.positions.len());
             data.positions.push(data.positions[from]);

@@ -177,7 +177,7 @@ fn what_only_some_primitives_have_is_made_up_for_the_others() {
     let mesh = mesh_of(&buffer.file(json!({ "meshes": [{ "primitives": [plain, rich, plain] }] })));
     assert_eq!(mesh.fault(), None);
     assert_eq!(mesh.normals[2..7], [[0.0; 3], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0; 3]]);
-    assert_eq!(mesh.uvs[0][2..5], [[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]);
+    assert_eq!(mesh.uvs[0][2..5], [[0.0, 1.0], [0.0, 0.0], [1.0, 0.0]]);
     assert_eq!((mesh.colors[2], mesh.colors[3], mesh.colors[8]), ([1.0; 4], [0.5; 4], [1.0; 4]));
     assert_eq!(mesh.face_materials, [0, 1, 2]);
     let alone = mesh_of(&buffer.file(json!({ "meshes": [{ "primitives": [plain] }] })));
@@ -488,10 +488,13 @@ fn sets_of_texture_coordinates_that_materials_name_are_there() {
     };
     let named = json!({ "occlusionTexture": { "index": 0, "texCoord": 1 } });
     let mesh = of(json!({ "POSITION": position, "TEXCOORD_0": uv }), named.clone());
-    assert_eq!((mesh.uvs[0][0], mesh.uvs[1].clone()), ([0.25, 0.25], vec![[0.0; 2]; 3]));
-    assert_eq!(mesh.notes, ["/meshes/0/primitives/0: has no TEXCOORD_1, which its material names: 0, 0 is taken"]);
+    assert_eq!((mesh.uvs[0][0], mesh.uvs[1].clone()), ([0.25, 0.25], vec![[0.0, 1.0]; 3]));
+    assert_eq!(
+        mesh.notes,
+        ["/meshes/0/primitives/0: has no TEXCOORD_1, which its material names: all vertices get 0, 0"]
+    );
     let mesh = of(json!({ "POSITION": position, "TEXCOORD_1": uv }), named);
-    assert_eq!((mesh.uvs[0].clone(), mesh.uvs[1][0]), (vec![[0.0; 2]; 3], [0.25, 0.25]));
+    assert_eq!((mesh.uvs[0].clone(), mesh.uvs[1][0]), (vec![[0.0, 1.0]; 3], [0.25, 0.25]));
     let moved = json!({ "index": 0, "extensions": { "KHR_texture_transform": { "texCoord": 2 } } });
     let mesh = of(json!({ "POSITION": position }), json!({ "normalTexture": moved }));
     assert_eq!(mesh.uvs.len(), 3);
