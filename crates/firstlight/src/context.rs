@@ -83,7 +83,7 @@ pub struct FolderAssets {
     root: PathBuf,
     allowed: Vec<PathBuf>,
     files: Mutex<BTreeSet<PathBuf>>,
-    /// What is in folders, where it was asked for: the names by those without case.
+    /// The names in each folder that was searched, by their lower-case form.
     listed: Mutex<HashMap<PathBuf, HashMap<String, OsString>>>,
 }
 
@@ -177,7 +177,7 @@ impl Assets for FolderAssets {
     }
 }
 
-/// The names of what is in a folder, by those without case.
+/// The names of the files and folders in a folder, by their lower-case form.
 fn names_in(folder: &Path) -> HashMap<String, OsString> {
     let mut names: Vec<OsString> =
         std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name()).collect();

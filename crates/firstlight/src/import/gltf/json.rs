@@ -73,38 +73,40 @@ impl<'a> JsonPlace<'a> {
         self.get("extensions")?.get(name)
     }
 
-    /// The textures that a material names, at any depth, with what for: `base color` of `baseColorTexture`.
-    pub fn textures(&self) -> Vec<(String, usize)> {
+    /// The references of a material to textures, at any depth, by their keys: `baseColorTexture`.
+    fn texture_references(&self) -> Vec<(&'a str, &'a Value)> {
         let (mut found, mut open) = (Vec::new(), vec![self.value]);
         while let Some(value) = open.pop() {
             for (key, value) in value.as_object().into_iter().flatten() {
-                let index = value.get("index").and_then(Value::as_u64).and_then(|index| usize::try_from(index).ok());
-                match (key.strip_suffix("Texture"), index) {
-                    (Some(of), Some(index)) => found.push((words(of), index)),
-                    _ => open.push(value),
+                match key.ends_with("Texture") && value.get("index").is_some() {
+                    true => found.push((key.as_str(), value)),
+                    false => open.push(value),
                 }
             }
         }
+        found
+    }
+
+    /// The textures that a material names, with what for: `base color` of `baseColorTexture`.
+    pub fn textures(&self) -> Vec<(String, usize)> {
+        let named = |(key, reference): (&str, &Value)| {
+            let index = reference.get("index")?.as_u64().and_then(|index| usize::try_from(index).ok())?;
+            Some((words(key.strip_suffix("Texture")?), index))
+        };
+        let mut found: Vec<(String, usize)> = self.texture_references().into_iter().filter_map(named).collect();
         found.sort();
         found.dedup();
         found
     }
 
-    /// The sets of texture coordinates that the textures of a material name, at any depth.
+    /// The sets of texture coordinates that the textures of a material name.
     pub fn uv_sets(&self) -> Vec<usize> {
-        let (mut found, mut open) = (Vec::new(), vec![self.value]);
-        while let Some(value) = open.pop() {
-            for (key, value) in value.as_object().into_iter().flatten() {
-                if key.ends_with("Texture") && value.get("index").is_some() {
-                    let moved = value.get("extensions").and_then(|all| all.get("KHR_texture_transform"));
-                    let set = moved.and_then(|moved| moved.get("texCoord")).or(value.get("texCoord"));
-                    found.push(set.and_then(Value::as_u64).map_or(0, |set| usize::try_from(set).unwrap_or(usize::MAX)));
-                } else {
-                    open.push(value);
-                }
-            }
-        }
-        found
+        let set_of = |(_, reference): (&str, &'a Value)| {
+            let moved = reference.get("extensions").and_then(|all| all.get("KHR_texture_transform"));
+            let set = moved.and_then(|moved| moved.get("texCoord")).or(reference.get("texCoord"));
+            set.and_then(Value::as_u64).map_or(0, |set| usize::try_from(set).unwrap_or(usize::MAX))
+        };
+        self.texture_references().into_iter().map(set_of).collect()
     }
 
     /// The images that a texture names, in extensions too.

@@ -7,6 +7,7 @@ use super::extensions::is_read;
 use super::material::VARIANTS;
 use crate::context::Assets;
 use crate::import::{Gltf, GltfFault, JsonPlace, MeshAddress, Uri, called};
+use crate::model::PictureFinder;
 use crate::model::report::{
     ModelAnimation, ModelCounts, ModelExtension, ModelFile, ModelMaterial, ModelPicture, ModelReport,
 };
@@ -121,12 +122,14 @@ fn pictures(gltf: &Gltf, file: &str, assets: &dyn Assets) -> Result<Vec<ModelPic
             }
         }
     }
+    let mut finder = PictureFinder::new(assets);
     let mut pictures = Vec::with_capacity(images.len());
     for (index, (image, uses)) in images.iter().zip(uses).enumerate() {
         let inside = format!("{file}#image/{index}");
         let uri = image.text_of("uri").filter(|_| image.get("bufferView").is_none());
         let (file, bytes) = match uri.map(|uri| Uri::of(uri, gltf.folder())) {
             Some(Uri::File(path)) => {
+                let path = finder.find(path, gltf.folder());
                 let bytes = assets.read(&path, MAX_PICTURE).map_err(|error| error.to_string());
                 (path, bytes)
             }

@@ -141,7 +141,7 @@ impl<'a> Materials<'a> {
         let mut common = self.common(at, base.as_ref(), factors[3])?;
         let base_color = color(factors, base);
         if at.extension("KHR_materials_unlit").is_some() {
-            // The others are there for readers without the extension
+            // KHR_materials_unlit: the base colour alone is shown
             (common.normal_map, common.emissive) = (None, MaterialCommonDesc::default().emissive);
             return Ok(MaterialDesc::Unlit(UnlitDesc { color: base_color, common }));
         }
@@ -190,10 +190,10 @@ impl<'a> Materials<'a> {
         }
         if let Some(transmission) = at.extension("KHR_materials_transmission") {
             let part = transmission.number_or("transmissionFactor", 0.0)?.clamp(0.0, 1.0);
-            // A metal lets no light through; a texture may say where it is none
+            // A metal transmits no light. A metalness texture is not looked up: its material counts as a dielectric
             let dielectric = 1.0 - if desc.metallic.texture.is_none() { desc.metallic.factor } else { 0.0 };
             let part = part * dielectric;
-            // What is cut out by a mask has no other alpha
+            // A masked material is opaque where it is not cut out
             if part > 0.0 && desc.common.alpha_mode != AlphaMode::Mask {
                 // Thin and clear: what the base colour lets through
                 let [r, g, b] = desc.base_color.factor.linear;
@@ -208,7 +208,7 @@ impl<'a> Materials<'a> {
                         factor: -through * coverage.factor,
                         bias: coverage.factor,
                     },
-                    // One texture at most: that of the coverage
+                    // Alpha has one texture; that of the base colour is kept
                     _ => NumberParam { factor: coverage.factor * (1.0 - through), ..coverage },
                 };
                 common.alpha_mode = AlphaMode::Blend;
@@ -286,7 +286,7 @@ impl<'a> Materials<'a> {
             };
             let cutoff = at.number_or("alphaCutoff", 0.5)?;
             common.cutoff = cutoff.clamp(0.0, 1.0);
-            // Above 1 nothing is left
+            // No alpha reaches a cutoff above 1: the whole surface is cut out
             if mode == AlphaMode::Mask && cutoff > 1.0 {
                 (common.alpha, common.cutoff) = (NumberParam::constant(0.0), 1.0);
             }
